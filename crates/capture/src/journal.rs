@@ -1,0 +1,100 @@
+use rig::Identity;
+use serde::{Deserialize, Serialize};
+
+use crate::Reading;
+
+/// First record of a journal: all that is needed to go on with the run elsewhere.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// Id of the run, never reused.
+    pub run: String,
+    /// Version of the program.
+    pub version: String,
+    /// The job file as given.
+    pub job: String,
+    /// The rig file as given.
+    pub rig: String,
+    /// Wall clock at the start, RFC 3339, UTC.
+    pub started: String,
+}
+
+/// How an execution of a plan ended.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "outcome")]
+pub enum Outcome {
+    /// Every step was read.
+    Done,
+    /// The operator stopped it; it can be resumed.
+    Stopped,
+    /// A fault ended it; it can be resumed once that is mended.
+    Failed {
+        /// The fault in words, with its causes.
+        fault: String,
+    },
+}
+
+/// One line of the journal.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", tag = "record")]
+pub enum Record {
+    /// The first one.
+    Header(Header),
+    /// An execution begins or goes on: who answered on the bus (light, sensor, photometer), and the device time.
+    Begin {
+        /// Light servo, sensor servo, photometer.
+        identities: Vec<Identity>,
+        /// Unwrapped device time, ticks of 10 µs.
+        device_ticks: u64,
+        /// Wall clock, RFC 3339, UTC.
+        at: String,
+    },
+    /// A reading was taken.
+    Reading(Reading),
+    /// An execution ended.
+    End {
+        /// How.
+        outcome: Outcome,
+        /// Unwrapped device time, ticks of 10 µs, where the photometer still answered.
+        device_ticks: Option<u64>,
+        /// Wall clock, RFC 3339, UTC.
+        at: String,
+    },
+}
+
+/// Why a journal could not be written or read.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum JournalError {
+    /// The medium refused.
+    #[error("cannot {what} the journal {path}")]
+    Io {
+        /// What was attempted.
+        what: &'static str,
+        /// Where.
+        path: std::path::PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// What is there is no journal, or one that is damaged before its end.
+    #[error("journal {path}, line {line}: {why}")]
+    Damaged {
+        /// Where.
+        path: std::path::PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// What was found.
+        why: String,
+    },
+}
+
+/// Where records are kept: append-only, in order.
+pub trait Journal: Send {
+    /// Appends a record and returns once it is durable.
+    ///
+    /// # Errors
+    /// The medium refused (disk full); what was appended before is still there.
+    fn append(&mut self, record: &Record) -> Result<(), JournalError>;
+
+    /// All records, oldest first.
+    fn records(&self) -> &[Record];
+}

@@ -1,0 +1,43 @@
+use arms::Pose;
+use rig::Counts;
+use serde::{Deserialize, Serialize};
+use sweep::Sweep;
+
+/// Something to know about a reading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Flag {
+    /// A channel is at full scale even in the shortest, weakest exposure.
+    Saturated,
+    /// Too few counts even in the longest, strongest exposure.
+    Dim,
+    /// The bus had to be asked more than once.
+    Retried,
+}
+
+/// One reading of the photometer with its pose, raw: nothing is subtracted or divided.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Reading {
+    /// Index of its step in the plan.
+    pub step: usize,
+    /// Exposures of this step before this one.
+    pub attempt: u32,
+    /// Whether this is the one that counts for its step; the others were saturated or too dim.
+    pub accepted: bool,
+    /// What it belongs to.
+    pub sweep: Sweep,
+    /// Whether the lamp was on.
+    pub lamp: bool,
+    /// Where the arms were told to be.
+    pub goal: Pose,
+    /// Where they were, measured after settling.
+    pub measured: Pose,
+    /// What the photometer said.
+    pub counts: Counts,
+    /// Device time at mid-integration since the photometer was switched on, unwrapped, in ticks of 10 µs.
+    pub device_ticks: u64,
+    /// Requests on the bus that had to be repeated for this reading.
+    pub retries: u32,
+    /// What to know about it.
+    pub flags: Vec<Flag>,
+}

@@ -1,0 +1,5 @@
+//! The technician's command line.
+
+fn main() -> std::process::ExitCode {
+    gonioctl::main()
+}

@@ -1,0 +1,1 @@
+//! The capture daemon as a library.

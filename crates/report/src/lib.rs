@@ -1,0 +1,1 @@
+//! A journal becomes a run directory: readings, factors, BRDF, pictures and checks.

@@ -1,0 +1,142 @@
+use std::path::PathBuf;
+use std::time::Duration;
+
+use arms::{Arm, ArmAngle, Envelope, Pose, Profile};
+
+use crate::{Axis, Calibration};
+
+/// The rig file, checked: what the rig is and where it may move.
+///
+/// Every key, its unit, default and range stand in config/rig.toml, which is also the built-in default.
+#[derive(Clone, Debug)]
+pub struct RigFile {
+    /// The serial bus.
+    pub bus: BusSettings,
+    /// Light and sensor arm, in this order.
+    pub arms: [ArmSettings; 2],
+    /// Limits and separation.
+    pub envelope: Envelope,
+    /// How arms move and settle.
+    pub motion: MotionSettings,
+    /// The photometer.
+    pub photometer: PhotometerSettings,
+    /// From counts to reflectance.
+    pub calibration: Calibration,
+    /// The `[sim]` table, parsed by the simulator alone.
+    pub sim: toml::Table,
+}
+
+/// `[bus]`
+#[derive(Clone, Debug, PartialEq)]
+pub struct BusSettings {
+    /// Where the bus is.
+    pub port: Port,
+    /// Baud rate.
+    pub baud: u32,
+    /// Worst latency of the adapter.
+    pub latency: Duration,
+    /// Whether the adapter echoes what is sent.
+    pub echo: bool,
+    /// A device that gives no good reply for so long is a fault.
+    pub silence: Duration,
+}
+
+/// Where the bus is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Port {
+    /// The built-in simulator.
+    Sim,
+    /// A serial device.
+    Path(PathBuf),
+}
+
+/// `[light]` and `[sensor]`
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArmSettings {
+    /// Bus id.
+    pub id: u8,
+    /// Model name.
+    pub model: String,
+    /// Between counts and arm angle.
+    pub axis: Axis,
+    /// Speed and acceleration, already rounded to what the servo's registers can hold.
+    pub profile: Profile,
+    /// Return delay that the servo must be set to.
+    pub return_delay: Duration,
+}
+
+/// `[motion]`
+#[derive(Clone, Debug, PartialEq)]
+pub struct MotionSettings {
+    /// Arrived: measured position within this of the goal, rad.
+    pub tolerance_rad: f64,
+    /// How long an arm must have been there before a reading.
+    pub settle: Duration,
+    /// By how much a motion may overrun its profile.
+    pub timeout: Duration,
+    /// Direction of the last approach.
+    pub approach: Approach,
+    /// How far a motion from the wrong side goes beyond, rad.
+    pub overshoot_rad: f64,
+    /// Servo bus watchdog while engaged; zero leaves it off.
+    pub watchdog: Duration,
+    /// What an emergency stop does.
+    pub estop: Estop,
+    /// Where the arms rest.
+    pub park: Pose,
+}
+
+/// Direction of the last approach to a pose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Approach {
+    /// Whichever way the arm comes.
+    None,
+    /// Towards larger angles.
+    Up,
+    /// Towards smaller angles.
+    Down,
+}
+
+/// What an emergency stop does with the arms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Estop {
+    /// Goal := present position.
+    Hold,
+    /// Torque off.
+    Limp,
+}
+
+/// `[photometer]`
+#[derive(Clone, Debug, PartialEq)]
+pub struct PhotometerSettings {
+    /// Bus id.
+    pub id: u8,
+    /// Shortest integration, µs.
+    pub integration_min_us: u32,
+    /// Longest integration, µs.
+    pub integration_max_us: u32,
+    /// Counts at which a channel is full.
+    pub full_scale: u32,
+    /// Share of full scale that an exposure aims at.
+    pub aim: f64,
+    /// Counts below which a reading is exposed again with more light.
+    pub enough: u32,
+    /// From lamp on to steady light.
+    pub lamp_warm_up: Duration,
+}
+
+impl RigFile {
+    /// Settings of one arm.
+    pub fn arm(&self, arm: Arm) -> &ArmSettings {
+        &self.arms[arm as usize]
+    }
+
+    /// The pose nearest to `pose` that the servos can be told to take: whole counts.
+    pub fn nearest(&self, pose: Pose) -> Pose {
+        let nearest = |arm: Arm| -> ArmAngle { self.arm(arm).axis.nearest(pose.angle(arm)) };
+        Pose {
+            light: nearest(Arm::Light),
+            sensor: nearest(Arm::Sensor),
+        }
+    }
+}

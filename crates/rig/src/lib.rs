@@ -1,0 +1,22 @@
+//! The two arms and the photometer: traits, the rig file, the Dynamixel bus and the calibration.
+//!
+//! [`Rig`] joins two [`Actuator`]s and a [`Detector`]. What must never differ between implementations (limits,
+//! settling, approach, retries, timeouts) is written once above the traits. Nothing here knows of plans or journals.
+
+mod actuator;
+mod axis;
+mod calibration;
+mod detector;
+mod fault;
+mod file;
+mod rig;
+
+pub use actuator::{Actuator, Identity, Location};
+pub use axis::Axis;
+pub use calibration::{Calibration, Filling};
+pub use detector::{Counts, Detector, DetectorStatus, Exposure, Gain, Phase};
+pub use fault::{Device, Fault, FaultKind};
+pub use file::{
+    Approach, ArmSettings, BusSettings, Estop, MotionSettings, PhotometerSettings, Port, RigFile,
+};
+pub use rig::{Rig, Snapshot};

@@ -1,0 +1,56 @@
+use serde::{Deserialize, Serialize};
+
+/// What is to be measured, from a checked job file.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Job {
+    /// What lies on the stage, in the technician's words.
+    pub specimen: String,
+    /// Plane sweeps, at least one.
+    pub planes: Vec<Plane>,
+    /// The mirror arc.
+    pub arc: Option<Arc>,
+    /// How the BRDF is made of the readings.
+    pub model: Model,
+}
+
+/// One plane sweep: the sensor stands at θ_r, the light crosses the plane.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Plane {
+    /// Where the sensor stands, rad from the normal, 0 … below π/2.
+    pub theta_r: f64,
+    /// Readings over both sides of the mirror direction.
+    pub readings: usize,
+    /// How d_p is distributed.
+    pub distribution: Distribution,
+}
+
+/// The mirror arc: light at −θ, sensor at +θ.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Arc {
+    /// Readings along the arc.
+    pub readings: usize,
+    /// Signed deviation from the mirror direction that the arc keeps, −1 … 1; 0 is the mirror direction itself.
+    pub offset: f64,
+}
+
+/// How the d_p of a plane are distributed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Distribution {
+    /// Inverse CDF of the capped mean of the MERL materials mixed with a uniform share.
+    #[default]
+    Capped,
+    /// Equation 1 of the paper as it stands.
+    Paper,
+    /// Evenly over the reachable range.
+    Uniform,
+}
+
+/// Reconstruction model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Model {
+    /// The paper's product F(θ_r)·G(d_p) in the logarithmic domain (Eq. 3).
+    #[default]
+    Separable,
+}
