@@ -1,0 +1,125 @@
+//! Dependencies run one way, and the crates at the bottom stay pure.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+/// What each crate stands on; it may also name what those stand on.
+const EDGES: [(&str, &[&str]); 12] = [
+    ("arms", &[]),
+    ("brdf", &[]),
+    ("pdv", &["brdf"]),
+    ("sweep", &["pdv", "arms"]),
+    ("rig", &["arms"]),
+    ("capture", &["sweep", "rig", "pdv"]),
+    ("report", &["capture", "pdv", "brdf"]),
+    ("firmware-sim", &["brdf", "arms", "rig"]),
+    ("study", &["report", "firmware-sim"]),
+    ("goniod", &["report", "firmware-sim"]),
+    ("gonioctl", &["goniod", "report", "study"]),
+    ("tests", &["gonioctl"]),
+];
+
+/// Crates whose own tests may use the in-process rig.
+const TESTED_ON_THE_SIMULATOR: [&str; 2] = ["capture", "report"];
+
+/// No I/O but files behind explicit functions: nothing of these may appear in their manifests or sources.
+const PURE: [&str; 4] = ["arms", "brdf", "pdv", "sweep"];
+const NOT_IN_A_PURE_MANIFEST: [&str; 4] = ["tokio", "rustix", "serialport", "tracing-subscriber"];
+const NOT_IN_A_PURE_SOURCE: [&str; 5] = [
+    "std::env",
+    "std::net",
+    "std::process",
+    "SystemTime",
+    "Instant::now",
+];
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("the tests crate lies in the workspace")
+        .to_owned()
+}
+
+fn directory(name: &str) -> PathBuf {
+    match name {
+        "firmware-sim" | "tests" => root().join(name),
+        _ => root().join("crates").join(name),
+    }
+}
+
+fn manifest(name: &str) -> toml::Table {
+    let path = directory(name).join("Cargo.toml");
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    text.parse().unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+fn dependencies(name: &str, section: &str) -> BTreeSet<String> {
+    let manifest = manifest(name);
+    let table = manifest.get(section).and_then(toml::Value::as_table);
+    table.into_iter().flat_map(|t| t.keys().cloned()).collect()
+}
+
+/// Everything below a crate.
+fn below(name: &str) -> BTreeSet<&'static str> {
+    let edges: BTreeMap<_, _> = EDGES.into_iter().collect();
+    let mut found = BTreeSet::new();
+    let mut open = edges[name].to_vec();
+    while let Some(next) = open.pop() {
+        if found.insert(next) {
+            open.extend(edges[next]);
+        }
+    }
+    found
+}
+
+#[test]
+fn every_crate_stands_only_on_what_lies_below_it() {
+    let ours: BTreeSet<&str> = EDGES.iter().map(|(name, _)| *name).collect();
+    for (name, _) in EDGES {
+        let allowed = below(name);
+        for section in ["dependencies", "dev-dependencies", "build-dependencies"] {
+            let on_simulator = section == "dev-dependencies" && TESTED_ON_THE_SIMULATOR.contains(&name);
+            for dependency in dependencies(name, section) {
+                let ok = !ours.contains(dependency.as_str())
+                    || allowed.contains(dependency.as_str())
+                    || (on_simulator && dependency == "firmware-sim");
+                assert!(
+                    ok,
+                    "{name} names {dependency} in [{section}]; it may stand on {allowed:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_table_above_names_every_crate_of_the_workspace() {
+    let mut found: BTreeSet<String> = std::fs::read_dir(root().join("crates"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    found.extend(["firmware-sim".to_owned(), "tests".to_owned()]);
+    let named: BTreeSet<String> = EDGES.iter().map(|(name, _)| (*name).to_owned()).collect();
+    assert_eq!(found, named);
+}
+
+#[test]
+fn the_crates_at_the_bottom_know_no_clock_no_environment_and_no_runtime() {
+    for name in PURE {
+        let named = dependencies(name, "dependencies");
+        for forbidden in NOT_IN_A_PURE_MANIFEST {
+            assert!(!named.contains(forbidden), "{name} depends on {forbidden}");
+        }
+        let mut open = vec![directory(name).join("src")];
+        while let Some(path) = open.pop() {
+            if path.is_dir() {
+                open.extend(std::fs::read_dir(&path).unwrap().map(|e| e.unwrap().path()));
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                let text = std::fs::read_to_string(&path).unwrap();
+                for forbidden in NOT_IN_A_PURE_SOURCE {
+                    assert!(!text.contains(forbidden), "{} uses {forbidden}", path.display());
+                }
+            }
+        }
+    }
+}
