@@ -49,6 +49,8 @@ pub enum FaultKind {
     Disconnected,
     /// The device is not what the rig file says: wrong model, mode, limits.
     Mismatch,
+    /// The rig file, or the port that it names, cannot be used; nothing was sent.
+    Setup,
 }
 
 /// An error of a rig, with the little that generic code needs of it.

@@ -1,14 +1,21 @@
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use arms::{Arm, ArmAngle, Envelope, Pose, Profile};
 
-use crate::{Axis, Calibration};
+use crate::{Axis, Calibration, RigError};
+
+mod check;
+mod raw;
+mod source;
+
+#[cfg(test)]
+mod tests;
 
 /// The rig file, checked: what the rig is and where it may move.
 ///
 /// Every key, its unit, default and range stand in config/rig.toml, which is also the built-in default.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct RigFile {
     /// The serial bus.
     pub bus: BusSettings,
@@ -126,6 +133,30 @@ pub struct PhotometerSettings {
 }
 
 impl RigFile {
+    /// Text of the built-in rig file, the shipped config/rig.toml.
+    pub const BUILT_IN: &str = include_str!("../../../config/rig.toml");
+
+    /// Checks the text of a rig file; keys that it lacks are those of the built-in one. `name` is for the errors.
+    ///
+    /// # Errors
+    /// No TOML, an unknown key, a wrong type, a value that is not allowed: with file, line and key.
+    pub fn parse(text: &str, name: &Path) -> Result<Self, RigError> {
+        check::file(&source::Source { text, name })
+    }
+
+    /// Reads and checks a rig file.
+    ///
+    /// # Errors
+    /// The file cannot be read; else as [`RigFile::parse`].
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, RigError> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path).map_err(|source| RigError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::parse(&text, path)
+    }
+
     /// Settings of one arm.
     pub fn arm(&self, arm: Arm) -> &ArmSettings {
         &self.arms[arm as usize]
@@ -138,5 +169,12 @@ impl RigFile {
             light: nearest(Arm::Light),
             sensor: nearest(Arm::Sensor),
         }
+    }
+}
+
+/// The built-in rig: the shipped config/rig.toml.
+impl Default for RigFile {
+    fn default() -> Self {
+        Self::parse("", Path::new("built-in rig file")).expect("the shipped rig file is tested")
     }
 }

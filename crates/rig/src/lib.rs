@@ -7,14 +7,17 @@ mod actuator;
 mod axis;
 mod calibration;
 mod detector;
+pub mod dynamixel;
+mod error;
 mod fault;
 mod file;
 mod rig;
 
 pub use actuator::{Actuator, Identity, Location};
-pub use axis::Axis;
+pub use axis::{ACCELERATION_UNIT_RAD_S2, Axis, COUNTS_PER_TURN, VELOCITY_UNIT_RAD_S};
 pub use calibration::{Calibration, Filling};
 pub use detector::{Counts, Detector, DetectorStatus, Exposure, Gain, Phase};
+pub use error::{Place, RigError};
 pub use fault::{Device, Fault, FaultKind};
 pub use file::{
     Approach, ArmSettings, BusSettings, Estop, MotionSettings, PhotometerSettings, Port, RigFile,

@@ -1,0 +1,82 @@
+use serde::Deserialize;
+use toml::Spanned;
+
+/// The rig file as TOML spells it; every key present, since the built-in file stands beneath.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawFile {
+    pub(super) bus: RawBus,
+    pub(super) light: RawArm,
+    pub(super) sensor: RawArm,
+    pub(super) envelope: RawEnvelope,
+    pub(super) motion: RawMotion,
+    pub(super) photometer: RawPhotometer,
+    pub(super) calibration: RawCalibration,
+    pub(super) sim: toml::Table,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawBus {
+    pub(super) port: Spanned<String>,
+    pub(super) baud: Spanned<i64>,
+    pub(super) latency_ms: Spanned<f64>,
+    pub(super) echo: bool,
+    pub(super) silence_ms: Spanned<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawArm {
+    pub(super) id: Spanned<i64>,
+    pub(super) model: Spanned<String>,
+    pub(super) sign: Spanned<i64>,
+    pub(super) zero_deg: Spanned<f64>,
+    pub(super) gear: Spanned<f64>,
+    pub(super) min_deg: Spanned<f64>,
+    pub(super) max_deg: Spanned<f64>,
+    pub(super) velocity_deg_s: Spanned<f64>,
+    pub(super) acceleration_deg_s2: Spanned<f64>,
+    pub(super) return_delay_us: Spanned<i64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawEnvelope {
+    pub(super) separation_deg: Spanned<f64>,
+    pub(super) can_pass: bool,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawMotion {
+    pub(super) tolerance_deg: Spanned<f64>,
+    pub(super) settle_ms: Spanned<f64>,
+    pub(super) timeout_ms: Spanned<f64>,
+    pub(super) approach: Spanned<String>,
+    pub(super) overshoot_deg: Spanned<f64>,
+    pub(super) watchdog_ms: Spanned<i64>,
+    pub(super) estop: Spanned<String>,
+    pub(super) park_light_deg: Spanned<f64>,
+    pub(super) park_sensor_deg: Spanned<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawPhotometer {
+    pub(super) id: Spanned<i64>,
+    pub(super) integration_min_us: Spanned<i64>,
+    pub(super) integration_max_us: Spanned<i64>,
+    pub(super) full_scale: Spanned<i64>,
+    pub(super) aim: Spanned<f64>,
+    pub(super) enough: Spanned<i64>,
+    pub(super) lamp_warm_up_ms: Spanned<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawCalibration {
+    pub(super) filling: Spanned<String>,
+    pub(super) responsivity: Spanned<[f64; 3]>,
+    pub(super) monitor: Spanned<f64>,
+}

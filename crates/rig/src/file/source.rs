@@ -1,0 +1,137 @@
+use std::fmt::Display;
+use std::ops::{Range, RangeInclusive};
+use std::path::Path;
+
+use serde::Deserialize;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::raw::RawFile;
+use crate::RigError;
+use crate::error::Place;
+
+/// Span of values that come from the built-in file: no line of the user's file is to blame for them.
+const BUILT_IN: Range<usize> = 0..0;
+
+/// The text of a rig file with its name; turns spans into lines.
+pub(super) struct Source<'a> {
+    pub(super) text: &'a str,
+    pub(super) name: &'a Path,
+}
+
+impl Source<'_> {
+    /// Reads the text over the built-in one, key by key.
+    pub(super) fn raw(&self, built_in: &str) -> Result<RawFile, RigError> {
+        let mut base = DeTable::parse(built_in).map_err(|error| self.form(&error, None))?;
+        unplace(base.get_mut());
+        let own = DeTable::parse(self.text).map_err(|error| self.form(&error, None))?;
+        overlay(base.get_mut(), own.get_ref().clone());
+        RawFile::deserialize(toml::de::Deserializer::from(base))
+            .map_err(|error| self.form(&error, Some(own.get_ref())))
+    }
+
+    fn form(&self, error: &toml::de::Error, table: Option<&DeTable<'_>>) -> RigError {
+        let span = error.span().filter(|span| *span != BUILT_IN);
+        RigError::Form {
+            place: self.place(span.as_ref()),
+            key: table
+                .zip(span)
+                .and_then(|(table, span)| key_at(table, span.start)),
+            why: error.message().to_owned(),
+        }
+    }
+
+    fn place(&self, span: Option<&Range<usize>>) -> Place {
+        let before = |span: &Range<usize>| self.text.get(..span.start);
+        Place {
+            file: self.name.to_owned(),
+            line: span
+                .and_then(before)
+                .map(|text| text.bytes().filter(|&b| b == b'\n').count() + 1),
+        }
+    }
+
+    /// The error of a value that is not allowed.
+    pub(super) fn refuse<T>(
+        &self,
+        key: &str,
+        value: &Spanned<T>,
+        found: impl Display,
+        allowed: impl Display,
+    ) -> RigError {
+        let span = Some(value.span()).filter(|span| *span != BUILT_IN);
+        RigError::Value {
+            place: self.place(span.as_ref()),
+            key: key.to_owned(),
+            found: found.to_string(),
+            allowed: allowed.to_string(),
+        }
+    }
+
+    /// A value within a range; NaN is in none.
+    pub(super) fn within<T: PartialOrd + Display + Copy>(
+        &self,
+        key: &str,
+        value: &Spanned<T>,
+        range: RangeInclusive<T>,
+    ) -> Result<T, RigError> {
+        let found = *value.get_ref();
+        if range.contains(&found) {
+            return Ok(found);
+        }
+        Err(self.refuse(key, value, found, format!("{} … {}", range.start(), range.end())))
+    }
+
+    /// One of a few words.
+    pub(super) fn one_of<T: Copy>(
+        &self,
+        key: &str,
+        value: &Spanned<String>,
+        words: &[(&str, T)],
+    ) -> Result<T, RigError> {
+        let found = words.iter().find(|(word, _)| word == value.get_ref());
+        found.map(|&(_, meaning)| meaning).ok_or_else(|| {
+            let allowed: Vec<_> = words.iter().map(|(word, _)| format!("\"{word}\"")).collect();
+            self.refuse(key, value, format!("\"{}\"", value.get_ref()), allowed.join(", "))
+        })
+    }
+}
+
+/// Marks every value of the built-in file as such.
+fn unplace(table: &mut DeTable<'_>) {
+    for (_, value) in table.iter_mut() {
+        let mut inner = std::mem::replace(value.get_mut(), DeValue::Boolean(false));
+        if let DeValue::Table(table) = &mut inner {
+            unplace(table);
+        }
+        *value = Spanned::new(BUILT_IN, inner);
+    }
+}
+
+/// Puts every key of `top` over those of `base`, table by table.
+fn overlay<'a>(base: &mut DeTable<'a>, top: DeTable<'a>) {
+    for (key, value) in top {
+        let span = value.span();
+        match (base.get_mut(&key).map(Spanned::get_mut), value.into_inner()) {
+            (Some(DeValue::Table(below)), DeValue::Table(above)) => overlay(below, above),
+            (_, value) => {
+                base.insert(key, Spanned::new(span, value));
+            }
+        }
+    }
+}
+
+/// Dotted path of the key whose value covers an offset.
+fn key_at(table: &DeTable<'_>, offset: usize) -> Option<String> {
+    table.iter().find_map(|(key, value)| {
+        let inner = match value.get_ref() {
+            DeValue::Table(table) => key_at(table, offset),
+            _ => None,
+        };
+        match inner {
+            Some(inner) => Some(format!("{}.{inner}", key.get_ref())),
+            None if value.span().contains(&offset) => Some(key.get_ref().to_string()),
+            None => None,
+        }
+    })
+}

@@ -1,0 +1,186 @@
+use std::path::Path;
+
+use super::*;
+
+fn parse(text: &str) -> Result<RigFile, RigError> {
+    RigFile::parse(text, Path::new("bench.toml"))
+}
+
+fn message(text: &str) -> String {
+    parse(text).expect_err(text).to_string()
+}
+
+#[test]
+fn the_shipped_file_is_the_default() {
+    assert_eq!(parse(RigFile::BUILT_IN).unwrap(), RigFile::default());
+    let rig = RigFile::default();
+    assert_eq!(rig.bus.port, Port::Sim);
+    assert_eq!(rig.bus.baud, 1_000_000);
+    assert_eq!(rig.arm(Arm::Sensor).id, 2);
+    assert_eq!(rig.arm(Arm::Light).axis.zero_count, 2048.0);
+    assert_eq!(rig.motion.park, Pose::from_deg(-45.0, 45.0));
+    assert_eq!(rig.sim["seed"].as_integer(), Some(1));
+}
+
+#[test]
+fn own_keys_stand_over_the_built_in_ones() {
+    let rig = parse(
+        "[bus]\nport = \"/dev/ttyUSB0\"\n[light]\nzero_deg = 90\n[sim]\nseed = 7\n[sim.noise]\nlamp = 0.1",
+    )
+    .unwrap();
+    assert_eq!(rig.bus.port, Port::Path("/dev/ttyUSB0".into()));
+    assert_eq!(rig.bus.baud, 1_000_000);
+    assert_eq!(rig.arm(Arm::Light).axis.zero_count, 1024.0);
+    assert_eq!(rig.sim["seed"].as_integer(), Some(7));
+    assert_eq!(rig.sim["specimen"].as_str(), Some("gold-paint"));
+    assert_eq!(rig.sim["noise"]["lamp"].as_float(), Some(0.1));
+}
+
+#[test]
+fn speed_is_what_the_servo_can_hold() {
+    let axis = RigFile::default().arms[0].axis;
+    let profile = RigFile::default().arms[0].profile;
+    assert_eq!(axis.profile_registers(profile), [43, 9]);
+    assert_eq!(axis.quantised(profile), profile);
+    let geared = parse("[light]\ngear = 2\n").unwrap().arms[0].clone();
+    assert_eq!(geared.axis.profile_registers(geared.profile), [87, 18]);
+}
+
+/// Every message with file, line, key and what is allowed.
+#[test]
+fn errors_say_where_and_what_is_allowed() {
+    let table = [
+        (
+            "[bus]\nbaud = 9600",
+            "bench.toml, line 2: bus.baud is 9600, allowed: 57600, 115200, 1000000, 2000000, 3000000, 4000000",
+        ),
+        (
+            "[bus]\nlatency_ms = -1",
+            "bench.toml, line 2: bus.latency_ms is -1, allowed: 0 … 100",
+        ),
+        (
+            "[bus]\nsilence_ms = nan",
+            "bench.toml, line 2: bus.silence_ms is NaN, allowed: 50 … 5000",
+        ),
+        (
+            "[bus]\nport = \"\"",
+            "bench.toml, line 2: bus.port is empty, allowed: \"sim\" or a serial port",
+        ),
+        (
+            "[light]\n\nid = 300",
+            "bench.toml, line 3: light.id is 300, allowed: 0 … 252",
+        ),
+        (
+            "[light]\nid = 2",
+            "bench.toml: sensor.id is 2, allowed: an id that no other device of the rig has",
+        ),
+        (
+            "[photometer]\nid = 1",
+            "bench.toml, line 2: photometer.id is 1, allowed: an id that no other device of the rig has",
+        ),
+        (
+            "[light]\nmodel = \"AX-12\"",
+            "bench.toml, line 2: light.model is \"AX-12\", allowed: \"XM430-W350\", \"XM430-W210\", \"XM540-W270\", \"XM540-W150\", \"XH540-W270\", \"XH540-W150\"",
+        ),
+        (
+            "[sensor]\nsign = 0",
+            "bench.toml, line 2: sensor.sign is 0, allowed: 1, -1",
+        ),
+        (
+            "[sensor]\nvelocity_deg_s = 1",
+            "bench.toml, line 2: sensor.velocity_deg_s is 1, allowed: 1.374 … 1405.602",
+        ),
+        (
+            "[sensor]\nacceleration_deg_s2 = 0",
+            "bench.toml, line 2: sensor.acceleration_deg_s2 is 0, allowed: 21.458 … 703104.455",
+        ),
+        (
+            "[sensor]\nreturn_delay_us = 3",
+            "bench.toml, line 2: sensor.return_delay_us is 3, allowed: 0 … 508 in steps of 2",
+        ),
+        (
+            "[sensor]\nmin_deg = 20\nmax_deg = 10",
+            "bench.toml, line 3: sensor.max_deg is 10, allowed: above sensor.min_deg, which is 20",
+        ),
+        (
+            "[sensor]\nmax_deg = 95",
+            "bench.toml, line 2: sensor.max_deg is 95, allowed: -90 … 90",
+        ),
+        (
+            "[light]\nzero_deg = 350",
+            "bench.toml: light.max_deg is 88, which is servo count 4983, allowed: servo counts 0 … 4095 after zero_deg, sign and gear",
+        ),
+        (
+            "[motion]\nestop = \"drop\"",
+            "bench.toml, line 2: motion.estop is \"drop\", allowed: \"hold\", \"limp\"",
+        ),
+        (
+            "[motion]\nwatchdog_ms = 30",
+            "bench.toml, line 2: motion.watchdog_ms is 30, allowed: 0, or 20 … 2540 in steps of 20",
+        ),
+        (
+            "[motion]\npark_light_deg = 89",
+            "bench.toml, line 2: motion.park_light_deg is 89, allowed: -88 … 88",
+        ),
+        (
+            "[motion]\npark_light_deg = 1\npark_sensor_deg = 3",
+            "bench.toml, line 3: motion.park_sensor_deg is 3: arms 2.000° apart with light at 1.000° and sensor at 3.000°, at least 5.000° are needed, allowed: a pose within [envelope]",
+        ),
+        (
+            "[photometer]\nintegration_min_us = 500\nintegration_max_us = 400",
+            "bench.toml, line 3: photometer.integration_max_us is 400, allowed: 500 … 10000000",
+        ),
+        (
+            "[calibration]\nresponsivity = [1.0, 0.0, 1.0]",
+            "bench.toml, line 2: calibration.responsivity is [1.0, 0.0, 1.0], allowed: three finite values > 0",
+        ),
+        (
+            "[calibration]\nmonitor = inf",
+            "bench.toml, line 2: calibration.monitor is inf, allowed: a finite value > 0",
+        ),
+    ];
+    for (text, expected) in table {
+        assert_eq!(message(text), expected);
+    }
+}
+
+#[test]
+fn bad_toml_unknown_keys_and_wrong_types_name_their_line() {
+    for (text, parts) in [
+        ("[bus\nport = 1", vec!["bench.toml, line 1: "]),
+        (
+            "[bus]\n\nboud = 1",
+            vec!["bench.toml, line 3: ", "unknown field `boud`", "`baud`"],
+        ),
+        ("[buss]\n", vec!["bench.toml, line 1: ", "unknown field `buss`"]),
+        (
+            "[bus]\nbaud = \"fast\"",
+            vec!["bench.toml, line 2: bus.baud: ", "string \"fast\""],
+        ),
+        (
+            "[bus]\nbaud = 1e6",
+            vec!["bench.toml, line 2: bus.baud: ", "floating point"],
+        ),
+        ("bus = 3", vec!["bench.toml, line 1: bus: "]),
+        (
+            "[sim]\nseed = 1\nseed = 2",
+            vec!["bench.toml, line 3: ", "duplicate key"],
+        ),
+        (
+            "[calibration]\nresponsivity = [1.0]",
+            vec!["bench.toml, line 2: calibration.responsivity: ", "length"],
+        ),
+    ] {
+        let message = message(text);
+        for part in parts {
+            assert!(message.contains(part), "{message:?} lacks {part:?}");
+        }
+    }
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let error = RigFile::load("/nowhere/rig.toml").unwrap_err();
+    assert_eq!(error.to_string(), "cannot read the rig file /nowhere/rig.toml");
+    assert_eq!(crate::Fault::kind(&error), crate::FaultKind::Setup);
+}
