@@ -55,6 +55,10 @@ pub trait Device {
     /// Addresses that do not exist or may not be written, values out of range, locked EEPROM, tripped watchdog.
     fn write(&mut self, address: u16, bytes: &[u8]) -> Result<(), Refusal>;
 
+    /// Takes note whether a Reg Write waits for Action (X-series register 69); devices without that register need not
+    /// care.
+    fn registered(&mut self, _waits: bool) {}
+
     /// Restarts it: RAM is lost, hardware errors are cleared, it is deaf while it boots.
     fn reboot(&mut self);
 
