@@ -52,7 +52,7 @@ impl Trajectory {
         let direction = if to_go - stop_distance >= 0.0 { 1.0 } else { -1.0 };
         // In the frame where the remaining way, after an immediate stop, is positive.
         let (v0, d) = (velocity * direction, to_go * direction);
-        let brake = (v0 > v_max) as u8 as f64 * (v0 - v_max) / a;
+        let brake = (v0 - v_max).max(0.0) / a;
         let v1 = v0.min(v_max);
         let d1 = d - (v0 + v1) / 2.0 * brake;
         // Peak of the triangle that starts at v1 and ends at rest after d1.

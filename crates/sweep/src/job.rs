@@ -3,6 +3,8 @@ use serde::{Deserialize, Serialize};
 /// What is to be measured, from a checked job file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Job {
+    /// What messages call the job file.
+    pub name: String,
     /// What lies on the stage, in the technician's words.
     pub specimen: String,
     /// Plane sweeps, at least one.

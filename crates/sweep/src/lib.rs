@@ -3,8 +3,19 @@
 //! Pure: text and mechanics go in, a [`Plan`] comes out. Listing it, timing it and drawing it are functions of it;
 //! nothing here moves an arm, reads a clock or knows of devices.
 
+mod error;
+mod file;
 mod job;
+mod mechanics;
+mod order;
 mod plan;
+mod planner;
+mod reach;
+mod route;
+mod targets;
 
+pub use error::SweepError;
 pub use job::{Arc, Distribution, Job, Model, Plane};
-pub use plan::{LeftOut, Mechanics, Plan, Step, Sweep};
+pub use mechanics::Mechanics;
+pub use plan::{LeftOut, Plan, Step, Sweep};
+pub use planner::plan;

@@ -1,4 +1,4 @@
-use arms::{Envelope, Pose, Profile};
+use arms::Pose;
 use serde::{Deserialize, Serialize};
 
 /// The part of a capture to which a step belongs.
@@ -15,6 +15,18 @@ pub enum Sweep {
     Reference,
     /// A pose that was measured before.
     Repeat,
+}
+
+impl std::fmt::Display for Sweep {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Dark => f.write_str("dark"),
+            Self::Plane(index) => write!(f, "plane {index}"),
+            Self::Arc => f.write_str("arc"),
+            Self::Reference => f.write_str("reference"),
+            Self::Repeat => f.write_str("repeat"),
+        }
+    }
 }
 
 /// One reading to be taken.
@@ -37,6 +49,9 @@ pub struct Step {
 
 impl Step {
     /// Where the reading is taken.
+    ///
+    /// # Panics
+    /// If the path is empty, which it is in no plan.
     pub fn pose(&self) -> Pose {
         *self.path.last().expect("a step's path ends at its pose")
     }
@@ -49,7 +64,8 @@ pub struct LeftOut {
     pub what: String,
     /// Why: "arms closer than 5.0°".
     pub why: String,
-    /// How many readings that would have been.
+    /// How many of the readings that the job asks for are not taken because of it; 0 where they went to the rest of
+    /// the sweep.
     pub readings: usize,
 }
 
@@ -69,29 +85,4 @@ impl Plan {
     pub fn seconds(&self) -> f64 {
         self.overhead_s + self.steps.iter().map(|step| step.seconds).sum::<f64>()
     }
-}
-
-/// What a plan needs to know of the rig: where the arms may go and how fast, and how long a reading takes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Mechanics {
-    /// Limits and separation.
-    pub envelope: Envelope,
-    /// Profiles of light and sensor arm.
-    pub profiles: [Profile; 2],
-    /// Smallest step of each arm, rad.
-    pub resolution_rad: [f64; 2],
-    /// +1 / −1: side from which the last approach comes (towards larger / smaller angles); 0: either.
-    pub approach: i8,
-    /// How far a motion from the wrong side goes beyond, rad.
-    pub overshoot_rad: f64,
-    /// Settling before each reading, s.
-    pub settle_s: f64,
-    /// Shortest and longest integration, µs.
-    pub integration_us: [u32; 2],
-    /// Expected time on the bus and on the host for each reading, s.
-    pub transaction_s: f64,
-    /// Lamp warm-up, s.
-    pub warm_up_s: f64,
-    /// Where the arms stand before the run; `None`: not known yet, then the plan's first leg is not timed or checked.
-    pub start: Option<Pose>,
 }

@@ -1,0 +1,163 @@
+use std::ops::{Range, RangeInclusive};
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::{Arc, Distribution, Job, Model, Plane, SweepError};
+
+/// Most plane sweeps of one job: their order is found by trying every one.
+const MAX_PLANES: usize = 12;
+/// Degrees from the normal at which a plane's sensor may stand.
+const THETA_R_DEG: RangeInclusive<f64> = 0.0..=85.0;
+/// Readings of one sweep.
+const READINGS: RangeInclusive<i64> = 1..=2000;
+/// Deviation that an arc keeps.
+const OFFSET: RangeInclusive<f64> = -1.0..=1.0;
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawJob {
+    #[serde(default)]
+    specimen: String,
+    #[serde(default)]
+    plane: Vec<RawPlane>,
+    arc: Option<RawArc>,
+    #[serde(default)]
+    reconstruction: RawReconstruction,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPlane {
+    theta_r_deg: Spanned<f64>,
+    readings: Spanned<i64>,
+    #[serde(default)]
+    distribution: Distribution,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawArc {
+    readings: Spanned<i64>,
+    offset: Option<Spanned<f64>>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(deny_unknown_fields)]
+struct RawReconstruction {
+    #[serde(default)]
+    model: Model,
+}
+
+/// The text of a file and its name, for saying where something is.
+struct Source<'a> {
+    text: &'a str,
+    name: &'a str,
+}
+
+impl Source<'_> {
+    fn line(&self, span: &Range<usize>) -> usize {
+        self.text.as_bytes()[..span.start.min(self.text.len())]
+            .iter()
+            .filter(|&&byte| byte == b'\n')
+            .count()
+            + 1
+    }
+
+    fn refuse(
+        &self,
+        span: Option<Range<usize>>,
+        key: impl Into<String>,
+        why: impl Into<String>,
+    ) -> SweepError {
+        SweepError::File {
+            file: self.name.to_owned(),
+            line: span.map(|span| self.line(&span)),
+            key: key.into(),
+            why: why.into(),
+        }
+    }
+
+    /// What toml itself refuses: syntax, unknown keys, missing keys, wrong types.
+    fn toml(&self, error: &toml::de::Error) -> SweepError {
+        let key = error.span().and_then(|span| {
+            let line = self.text.lines().nth(self.line(&span) - 1)?;
+            let key = line.split('=').next()?.trim();
+            (!key.is_empty()).then(|| key.to_owned())
+        });
+        let why = error.message().lines().collect::<Vec<_>>().join(", ");
+        self.refuse(error.span(), key.unwrap_or_else(|| "job file".to_owned()), why)
+    }
+
+    fn within<T: PartialOrd + Copy + std::fmt::Display>(
+        &self,
+        value: &Spanned<T>,
+        key: impl Into<String>,
+        allowed: &RangeInclusive<T>,
+    ) -> Result<T, SweepError> {
+        // NaN is in no range.
+        if allowed.contains(value.get_ref()) {
+            return Ok(*value.get_ref());
+        }
+        let why = format!(
+            "{} is not within {} … {}",
+            value.get_ref(),
+            allowed.start(),
+            allowed.end()
+        );
+        Err(self.refuse(Some(value.span()), key, why))
+    }
+
+    fn readings(&self, value: &Spanned<i64>, key: impl Into<String>) -> Result<usize, SweepError> {
+        let readings = self.within(value, key, &READINGS)?;
+        Ok(usize::try_from(readings).expect("within 1 … 2000"))
+    }
+}
+
+impl Job {
+    /// Reads the text of a job file; `name` is what messages call it.
+    ///
+    /// Planes need θ_r of 0 … 85°, every sweep 1 … 2000 readings, an arc an offset of −1 … 1.
+    ///
+    /// # Errors
+    /// Names file, line, key and what is allowed: unknown or missing keys, wrong types, values out of range, no
+    /// plane or more than 12.
+    pub fn parse(text: &str, name: &str) -> Result<Self, SweepError> {
+        let source = Source { text, name };
+        let raw: RawJob = toml::from_str(text).map_err(|error| source.toml(&error))?;
+        if raw.plane.is_empty() || raw.plane.len() > MAX_PLANES {
+            let why = format!("{} planes, allowed are 1 … {MAX_PLANES}", raw.plane.len());
+            return Err(source.refuse(None, "[[plane]]", why));
+        }
+        let planes = raw.plane.iter().enumerate().map(|(i, plane)| {
+            let theta_r_deg = source.within(
+                &plane.theta_r_deg,
+                format!("plane[{i}].theta_r_deg"),
+                &THETA_R_DEG,
+            )?;
+            Ok(Plane {
+                theta_r: theta_r_deg.to_radians(),
+                readings: source.readings(&plane.readings, format!("plane[{i}].readings"))?,
+                distribution: plane.distribution,
+            })
+        });
+        let arc = raw.arc.map(|arc| {
+            let offset = arc
+                .offset
+                .as_ref()
+                .map(|offset| source.within(offset, "arc.offset", &OFFSET))
+                .transpose()?;
+            Ok(Arc {
+                readings: source.readings(&arc.readings, "arc.readings")?,
+                offset: offset.unwrap_or(0.0),
+            })
+        });
+        Ok(Self {
+            name: name.to_owned(),
+            specimen: raw.specimen,
+            planes: planes.collect::<Result<_, _>>()?,
+            arc: arc.transpose()?,
+            model: raw.reconstruction.model,
+        })
+    }
+}

@@ -1,0 +1,108 @@
+use arms::Pose;
+
+use crate::Mechanics;
+use crate::route::{Standing, route};
+
+/// Stands for a way that does not exist: dearer than any real one, and still comparable.
+const NO_WAY_S: f64 = 1e6;
+
+/// Order and direction of the sweeps with the least time of motion: pairs of a sweep's index and whether it is run
+/// backwards.
+///
+/// Exact: every sequence is covered by the recursion of Held and Karp (1962) over sets of finished sweeps, so time
+/// and memory grow like 2ⁿ; n ≤ 13 here.
+pub(crate) fn order(
+    mechanics: &Mechanics,
+    start: Option<Standing>,
+    sweeps: &[Vec<Pose>],
+) -> Vec<(usize, bool)> {
+    let n = sweeps.len();
+    let run = |node: usize| Run {
+        poses: &sweeps[node / 2],
+        backwards: node % 2 == 1,
+    };
+    let within: Vec<f64> = (0..2 * n).map(|node| run(node).seconds(mechanics)).collect();
+    let between = |from: usize, to: usize| {
+        let from = Standing {
+            pose: run(from).last(),
+            approached: true,
+        };
+        way_s(mechanics, from, run(to).first())
+    };
+    let between: Vec<Vec<f64>> = (0..2 * n)
+        .map(|from| (0..2 * n).map(|to| between(from, to)).collect())
+        .collect();
+
+    // Per set of finished sweeps and last one: least seconds, and the one before.
+    let mut best = vec![vec![(f64::INFINITY, usize::MAX); 2 * n]; 1 << n];
+    for node in 0..2 * n {
+        let to_first = start.map_or(0.0, |start| way_s(mechanics, start, run(node).first()));
+        best[1 << (node / 2)][node] = (to_first + within[node], usize::MAX);
+    }
+    for done in 1..1_usize << n {
+        for last in (0..2 * n).filter(|last| done >> (last / 2) & 1 == 1) {
+            for next in (0..2 * n).filter(|next| done >> (next / 2) & 1 == 0) {
+                let seconds = best[done][last].0 + between[last][next] + within[next];
+                let entry = &mut best[done | 1 << (next / 2)][next];
+                if seconds < entry.0 {
+                    *entry = (seconds, last);
+                }
+            }
+        }
+    }
+
+    let mut done = (1 << n) - 1;
+    let mut last = (0..2 * n).min_by(|&a, &b| best[done][a].0.total_cmp(&best[done][b].0));
+    let mut order = Vec::with_capacity(n);
+    while let Some(node) = last {
+        order.push((node / 2, node % 2 == 1));
+        let before = best[done][node].1;
+        done &= !(1 << (node / 2));
+        last = (before != usize::MAX).then_some(before);
+    }
+    order.reverse();
+    order
+}
+
+fn way_s(mechanics: &Mechanics, from: Standing, to: Pose) -> f64 {
+    route(mechanics, from, to).map_or(NO_WAY_S, |route| route.seconds)
+}
+
+/// A sweep in one of its two directions; its poses are not empty.
+struct Run<'a> {
+    poses: &'a [Pose],
+    backwards: bool,
+}
+
+impl Run<'_> {
+    fn at(&self, i: usize) -> Pose {
+        self.poses[if self.backwards {
+            self.poses.len() - 1 - i
+        } else {
+            i
+        }]
+    }
+
+    fn first(&self) -> Pose {
+        self.at(0)
+    }
+
+    fn last(&self) -> Pose {
+        self.at(self.poses.len() - 1)
+    }
+
+    fn seconds(&self, mechanics: &Mechanics) -> f64 {
+        (1..self.poses.len())
+            .map(|i| {
+                way_s(
+                    mechanics,
+                    Standing {
+                        pose: self.at(i - 1),
+                        approached: true,
+                    },
+                    self.at(i),
+                )
+            })
+            .sum()
+    }
+}

@@ -1,0 +1,184 @@
+use std::f64::consts::FRAC_PI_2;
+use std::ops::Range;
+
+use arms::{Arm, ArmAngle, Pose};
+
+use crate::reach::{Hindrance, Reach};
+use crate::{Arc, Job, LeftOut, Mechanics, Plane, Sweep, SweepError};
+
+/// The poses of one sweep, in the order of its angle, and what it leaves out.
+#[derive(Clone, Debug)]
+pub(crate) struct Targets {
+    pub(crate) sweep: Sweep,
+    pub(crate) poses: Vec<Pose>,
+    pub(crate) left_out: Vec<LeftOut>,
+}
+
+/// Poses along one degree of freedom, ascending, cut into stretches where all can be measured or all are hindered
+/// in the same way.
+struct Stretches {
+    poses: Vec<Pose>,
+    stretches: Vec<(Range<usize>, Option<Hindrance>)>,
+}
+
+impl Stretches {
+    fn new(reach: Reach<'_>, poses: impl Iterator<Item = Pose>) -> Self {
+        let poses: Vec<Pose> = poses.collect();
+        let mut stretches: Vec<(Range<usize>, Option<Hindrance>)> = Vec::new();
+        for (i, &pose) in poses.iter().enumerate() {
+            let hindrance = reach.check(pose).err();
+            match stretches.last_mut() {
+                Some((range, last)) if *last == hindrance => range.end = i + 1,
+                _ => stretches.push((i..i + 1, hindrance)),
+            }
+        }
+        Self { poses, stretches }
+    }
+
+    fn reachable(&self) -> impl Iterator<Item = &[Pose]> {
+        let free = self.stretches.iter().filter(|(_, hindrance)| hindrance.is_none());
+        free.map(|(range, _)| &self.poses[range.clone()])
+    }
+
+    /// The hindered stretches in words; their readings went to the rest of the sweep.
+    fn left_out(&self, reach: Reach<'_>, sweep: &str, arm: Arm) -> Vec<LeftOut> {
+        let describe = |(range, hindrance): &(Range<usize>, Option<Hindrance>)| {
+            let [first, last] = [range.start, range.end - 1].map(|i| self.poses[i].angle(arm).deg());
+            Some(LeftOut {
+                what: format!("{sweep}, {arm} {first:.1}° … {last:.1}°"),
+                why: reach.why(hindrance.as_ref()?),
+                readings: 0,
+            })
+        };
+        self.stretches.iter().filter_map(describe).collect()
+    }
+}
+
+/// Poses of plane `index` of a job: the sensor stands, the light takes the d_p of the plane's distribution on both
+/// sides of the mirror direction; the one nearest to the arc's offset is put where the arc crosses the plane, so
+/// that both sweeps share that pose.
+pub(crate) fn plane(job: &Job, index: usize, reach: Reach<'_>) -> Result<Targets, SweepError> {
+    let plane = &job.planes[index];
+    let mechanics = reach.mechanics;
+    let name = format!("plane {:.1}°", plane.theta_r.to_degrees());
+    let sensor = mechanics.nearest(Arm::Sensor, ArmAngle::from_rad(plane.theta_r));
+    let light = |angle| Pose { light: angle, sensor };
+    let quarter = ArmAngle::from_rad(FRAC_PI_2);
+    let stretches = Stretches::new(reach, mechanics.angles(Arm::Light, -quarter, quarter).map(light));
+    let mut left_out = stretches.left_out(reach, &name, Arm::Light);
+    if stretches.reachable().next().is_none() {
+        let why: Vec<_> = left_out.iter().map(|left| left.why.as_str()).collect();
+        return Err(SweepError::Unreachable {
+            file: job.name.clone(),
+            key: format!("plane[{index}].theta_r_deg"),
+            why: format!(
+                "no reading can be taken at {:.1}°: {}",
+                sensor.deg(),
+                why.join("; ")
+            ),
+        });
+    }
+    let mut poses: Vec<Pose> = deviations(plane, sensor, &stretches, mechanics)
+        .into_iter()
+        .map(|d| light(mechanics.nearest(Arm::Light, ArmAngle::from_rad(at_deviation(d, sensor)))))
+        .filter(|&pose| reach.check(pose).is_ok())
+        .collect();
+    let crossing = job.arc.map_or(0.0, |arc| arc.offset);
+    let crossing = light(mechanics.nearest(Arm::Light, ArmAngle::from_rad(at_deviation(crossing, sensor))));
+    if reach.check(crossing).is_ok() {
+        pin(&mut poses, crossing, Arm::Light);
+    }
+    poses.dedup();
+    if poses.len() < plane.readings {
+        left_out.push(LeftOut {
+            what: format!("{name}, {} values of d_p", plane.readings - poses.len()),
+            why: "closer than one servo count to their neighbours".to_owned(),
+            readings: plane.readings - poses.len(),
+        });
+    }
+    Ok(Targets {
+        sweep: Sweep::Plane(index),
+        poses,
+        left_out,
+    })
+}
+
+/// Poses of the mirror arc: sensor at +θ, light where the deviation is the offset, evenly over all θ that can be
+/// measured. The θ nearest to each plane is that plane's, so that both sweeps share a pose.
+pub(crate) fn arc(job: &Job, arc: &Arc, reach: Reach<'_>) -> Result<Targets, SweepError> {
+    let mechanics = reach.mechanics;
+    let pose = |sensor| {
+        let light = ArmAngle::from_rad(at_deviation(arc.offset, sensor));
+        Pose {
+            light: mechanics.nearest(Arm::Light, light),
+            sensor,
+        }
+    };
+    let quarter = ArmAngle::from_rad(FRAC_PI_2);
+    let exists = |sensor: &ArmAngle| (arc.offset - sensor.rad().sin()).abs() <= 1.0;
+    let sensors = mechanics
+        .angles(Arm::Sensor, ArmAngle::NORMAL, quarter)
+        .filter(exists);
+    let stretches = Stretches::new(reach, sensors.map(pose));
+    let mut left_out = stretches.left_out(reach, "arc", Arm::Sensor);
+    let free: Vec<Pose> = stretches.reachable().flatten().copied().collect();
+    if free.is_empty() {
+        let why: Vec<_> = left_out.iter().map(|left| left.why.as_str()).collect();
+        return Err(SweepError::Unreachable {
+            file: job.name.clone(),
+            key: "arc.offset".to_owned(),
+            why: format!("no reading can be taken at {}: {}", arc.offset, why.join("; ")),
+        });
+    }
+    let spacing = (free.len() - 1) as f64 / (arc.readings.max(2) - 1) as f64;
+    let mut poses: Vec<Pose> = (0..arc.readings)
+        .map(|i| free[((i as f64 * spacing).round() as usize).min(free.len() - 1)])
+        .collect();
+    poses.dedup();
+    for plane in &job.planes {
+        let crossing = pose(mechanics.nearest(Arm::Sensor, ArmAngle::from_rad(plane.theta_r)));
+        if free.contains(&crossing) {
+            pin(&mut poses, crossing, Arm::Sensor);
+        }
+    }
+    poses.dedup();
+    if poses.len() < arc.readings {
+        left_out.push(LeftOut {
+            what: format!("arc, {} values of θ_r", arc.readings - poses.len()),
+            why: "closer than one servo count to their neighbours".to_owned(),
+            readings: arc.readings - poses.len(),
+        });
+    }
+    Ok(Targets {
+        sweep: Sweep::Arc,
+        poses,
+        left_out,
+    })
+}
+
+/// Arm angle at which the light deviates by `d` from the mirror direction of the sensor, rad: sin α_light = d −
+/// sin α_sensor, clamped to ±π/2 against rounding at the rim.
+fn at_deviation(d: f64, sensor: ArmAngle) -> f64 {
+    (d - sensor.rad().sin()).clamp(-1.0, 1.0).asin()
+}
+
+/// Moves the pose nearest to `to`, judged by one arm, to it.
+fn pin(poses: &mut [Pose], to: Pose, arm: Arm) {
+    let distance = |pose: &Pose| (pose.angle(arm) - to.angle(arm)).abs();
+    if let Some(nearest) = poses
+        .iter_mut()
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    {
+        *nearest = to;
+    }
+}
+
+/// The signed deviations of a plane, ascending.
+fn deviations(plane: &Plane, sensor: ArmAngle, stretches: &Stretches, mechanics: &Mechanics) -> Vec<f64> {
+    let _ = (sensor, mechanics);
+    let all: Vec<f64> = stretches.reachable().flatten().map(Pose::deviation).collect();
+    let spacing = (all.len() - 1) as f64 / (plane.readings.max(2) - 1) as f64;
+    (0..plane.readings)
+        .map(|i| all[(i as f64 * spacing).round() as usize])
+        .collect()
+}
