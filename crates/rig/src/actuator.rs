@@ -27,7 +27,9 @@ pub struct Location {
     pub in_position: bool,
     /// Whether a motion is in progress.
     pub moving: bool,
-    /// Hardware error bits (X-series register 70); not 0: torque is off.
+    /// Whether the motor holds or moves the arm; off after a reboot or a hardware error.
+    pub torque: bool,
+    /// Hardware error bits (X-series register 70).
     pub hardware_error: u8,
 }
 

@@ -136,11 +136,11 @@ pub trait Detector: Send {
     /// No reply.
     fn status(&mut self) -> impl Future<Output = Result<DetectorStatus, Self::Error>> + Send;
 
-    /// The latest reading.
+    /// The latest reading; `None` before the first trigger and while one is being taken.
     ///
     /// # Errors
     /// No reply.
-    fn counts(&mut self) -> impl Future<Output = Result<Counts, Self::Error>> + Send;
+    fn counts(&mut self) -> impl Future<Output = Result<Option<Counts>, Self::Error>> + Send;
 
     /// The device's own clock now, in ticks of 10 µs, 24 bits, wraps.
     ///
