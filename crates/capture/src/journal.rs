@@ -1,7 +1,8 @@
 use rig::Identity;
 use serde::{Deserialize, Serialize};
+use sweep::Plan;
 
-use crate::Reading;
+use crate::{JournalError, Reading};
 
 /// First record of a journal: all that is needed to go on with the run elsewhere.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -14,6 +15,9 @@ pub struct Header {
     pub job: String,
     /// The rig file as given.
     pub rig: String,
+    /// What is measured. Kept, not planned again: planning depends on where the arms stood and on the program's
+    /// version, and readings refer to its steps by index.
+    pub plan: Plan,
     /// Wall clock at the start, RFC 3339, UTC.
     pub started: String,
 }
@@ -58,32 +62,6 @@ pub enum Record {
         device_ticks: Option<u64>,
         /// Wall clock, RFC 3339, UTC.
         at: String,
-    },
-}
-
-/// Why a journal could not be written or read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum JournalError {
-    /// The medium refused.
-    #[error("cannot {what} the journal {path}")]
-    Io {
-        /// What was attempted.
-        what: &'static str,
-        /// Where.
-        path: std::path::PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// What is there is no journal, or one that is damaged before its end.
-    #[error("journal {path}, line {line}: {why}")]
-    Damaged {
-        /// Where.
-        path: std::path::PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// What was found.
-        why: String,
     },
 }
 
