@@ -61,3 +61,28 @@ pub trait Fault: std::error::Error + Send + Sync + 'static {
     /// The device at fault, where one can be named.
     fn device(&self) -> Option<Device>;
 }
+
+/// The bits of a Hardware Error Status in words (e-manual, "Hardware Error Status(70)"; docs/photometer.md).
+pub(crate) fn hardware_error_names(device: Device, bits: u8) -> String {
+    let bit_5 = match device {
+        Device::Photometer => "lamp failure",
+        Device::Light | Device::Sensor => "overload",
+    };
+    let names = [
+        (0, "input voltage"),
+        (2, "overheating"),
+        (3, "encoder error"),
+        (4, "electrical shock"),
+        (5, bit_5),
+    ];
+    let named: Vec<_> = names
+        .iter()
+        .filter(|(bit, _)| bits & (1 << bit) != 0)
+        .map(|&(_, name)| name)
+        .collect();
+    if named.is_empty() {
+        format!("hardware error {bits:#04x}")
+    } else {
+        named.join(" and ")
+    }
+}

@@ -7,6 +7,7 @@ mod actuator;
 mod axis;
 mod calibration;
 mod detector;
+mod drive;
 pub mod dynamixel;
 mod error;
 mod fault;
@@ -17,6 +18,7 @@ pub use actuator::{Actuator, Identity, Location};
 pub use axis::{ACCELERATION_UNIT_RAD_S2, Axis, COUNTS_PER_TURN, VELOCITY_UNIT_RAD_S};
 pub use calibration::{Calibration, Filling};
 pub use detector::{Counts, Detector, DetectorStatus, Exposure, Gain, Phase};
+pub use drive::{Drive, DriveError};
 pub use error::{Place, RigError};
 pub use fault::{Device, Fault, FaultKind};
 pub use file::{

@@ -1,0 +1,131 @@
+use std::time::Duration;
+
+use arms::Arm;
+
+use crate::{Detector, Rig, RigFile, Snapshot};
+
+mod all;
+mod error;
+mod expose;
+mod retry;
+mod travel;
+
+pub use error::DriveError;
+
+/// Longest wait between two looks at a rig that is engaged or lit: soon enough to stop the other arm when one fails.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// A rig with what must never differ between rigs: limits, settling, approach, retries and timeouts.
+///
+/// Nothing moves or lights up until it is told to, and nothing is stopped on drop: whoever drives calls
+/// [`Drive::stop_all`] or [`Drive::disengage_all`] on every way out.
+#[derive(Debug)]
+pub struct Drive<R: Rig> {
+    rig: R,
+    file: RigFile,
+    retries: u32,
+    /// All that the rig was told to wait, ever.
+    waited: Duration,
+    engaged: bool,
+    lamp: bool,
+}
+
+impl<R: Rig> Drive<R> {
+    /// Takes a rig and the file that describes it; does nothing yet.
+    pub fn new(rig: R, file: RigFile) -> Self {
+        Self {
+            rig,
+            file,
+            retries: 0,
+            waited: Duration::ZERO,
+            engaged: false,
+            lamp: false,
+        }
+    }
+
+    /// The rig file.
+    pub fn file(&self) -> &RigFile {
+        &self.file
+    }
+
+    /// The rig itself, past all checks.
+    pub fn rig(&mut self) -> &mut R {
+        &mut self.rig
+    }
+
+    /// Requests that were repeated so far; the difference over a reading is that reading's.
+    pub fn retries(&self) -> u32 {
+        self.retries
+    }
+
+    /// Where the arms are and what the photometer does.
+    ///
+    /// # Errors
+    /// A silent device; once engaged also a hardware error or lost torque.
+    pub async fn snapshot(&mut self) -> Result<Snapshot, DriveError<R::Error>> {
+        let snapshot = self
+            .retry("read the rig's state", |rig| Box::pin(rig.snapshot()))
+            .await?;
+        if self.engaged {
+            for arm in Arm::BOTH {
+                let location = snapshot.arms[arm as usize];
+                let (bits, measured) = (location.hardware_error, location.measured);
+                if bits != 0 {
+                    return Err(DriveError::Hardware { arm, bits, measured });
+                }
+                if !location.torque {
+                    return Err(DriveError::TorqueLost { arm, measured });
+                }
+            }
+        }
+        Ok(snapshot)
+    }
+
+    /// Lets time pass. While arms are engaged or the lamp is on, it looks at the rig every now and then, which also
+    /// keeps the watchdogs from tripping.
+    ///
+    /// # Errors
+    /// What [`Drive::snapshot`] finds.
+    pub async fn wait(&mut self, duration: Duration) -> Result<(), DriveError<R::Error>> {
+        let watchdog = self.file.motion.watchdog;
+        // Three looks per watchdog time: one may be late.
+        let slice = match self.engaged || self.lamp {
+            true if watchdog.is_zero() => LOOK,
+            true => LOOK.min(watchdog / 3),
+            false => Duration::MAX,
+        };
+        let mut left = duration;
+        while !left.is_zero() {
+            let now = left.min(slice);
+            self.retry("let time pass", |rig| Box::pin(rig.wait(now))).await?;
+            self.waited += now;
+            left -= now;
+            if !left.is_zero() {
+                self.snapshot().await?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Switches the lamp; does not wait for it to warm up.
+    ///
+    /// # Errors
+    /// A silent or failing photometer.
+    pub async fn lamp(&mut self, on: bool) -> Result<(), DriveError<R::Error>> {
+        self.retry("switch the lamp", |rig| Box::pin(rig.photometer().lamp(on)))
+            .await?;
+        self.lamp = on;
+        Ok(())
+    }
+
+    /// The photometer's clock now, ticks of 10 µs, 24 bits, wraps.
+    ///
+    /// # Errors
+    /// A silent photometer.
+    pub async fn ticks(&mut self) -> Result<u32, DriveError<R::Error>> {
+        self.retry("read the photometer's clock", |rig| {
+            Box::pin(rig.photometer().ticks())
+        })
+        .await
+    }
+}

@@ -1,0 +1,75 @@
+use std::time::Duration;
+
+use super::retry::Patience;
+use super::{Drive, DriveError};
+use crate::{Counts, Exposure, FaultKind, Rig};
+use crate::{Detector, Fault};
+
+/// Sequence numbers have 24 bits (docs/photometer.md).
+const SEQUENCE_MODULUS: u32 = 1 << 24;
+
+/// Time between two looks at an integration that should have ended.
+const POLL: Duration = Duration::from_millis(1);
+
+impl<R: Rig> Drive<R> {
+    /// Takes one reading: triggers once, waits for the integration, reads the counts.
+    ///
+    /// A trigger whose acknowledgement was lost is looked for in the sequence number before another one is sent, so
+    /// that nothing is exposed twice.
+    ///
+    /// # Errors
+    /// A silent or failing photometer; a reading that is not the one triggered.
+    pub async fn expose(&mut self, exposure: Exposure) -> Result<Counts, DriveError<R::Error>> {
+        let before = self.sequence().await?;
+        let expected = (before + 1) % SEQUENCE_MODULUS;
+        let wrong = |found: String| DriveError::Reading {
+            expected,
+            exposure,
+            found,
+        };
+        let mut patience = Patience::new(self.file.bus.silence);
+        while let Err(error) = self.rig.photometer().trigger(exposure).await {
+            let lost = error.kind() == FaultKind::NoReply;
+            patience.spend("trigger the photometer", error).await?;
+            self.retries += 1;
+            let now = self.sequence().await?;
+            if lost && now == expected {
+                break;
+            }
+            if now != before {
+                return Err(wrong(format!("sequence number went from {before} to {now}")));
+            }
+        }
+        let waited = self.waited;
+        self.wait(exposure.duration()).await?;
+        loop {
+            let counts = self
+                .retry("read the photometer's counts", |rig| {
+                    Box::pin(rig.photometer().counts())
+                })
+                .await?;
+            match counts {
+                Some(counts) if counts.sequence != expected => {
+                    return Err(wrong(format!("reading {} came", counts.sequence)));
+                }
+                Some(counts) if counts.exposure != exposure => {
+                    return Err(wrong(format!("it was taken with {:?}", counts.exposure)));
+                }
+                Some(counts) => return Ok(counts),
+                None if self.waited - waited > exposure.duration() + self.file.motion.timeout => {
+                    return Err(wrong("still integrating".to_owned()));
+                }
+                None => self.wait(POLL).await?,
+            }
+        }
+    }
+
+    async fn sequence(&mut self) -> Result<u32, DriveError<R::Error>> {
+        let status = self
+            .retry("read the photometer's status", |rig| {
+                Box::pin(rig.photometer().status())
+            })
+            .await?;
+        Ok(status.sequence)
+    }
+}
