@@ -4,6 +4,23 @@
 //! client, and `in_process`, the same bench as a `rig::Rig` over tokio time. Neither door is simulated in
 //! terms of the other.
 
+mod baud;
+mod bench;
 mod device;
+mod error;
+mod fault;
+mod imperfections;
+mod lamp;
+mod optics;
+mod photodiodes;
+mod photometer;
+mod servo;
+mod settings;
+mod table;
 
+pub use bench::Bench;
 pub use device::{Device, Refusal};
+pub use error::SimError;
+pub use fault::{Disturbance, Fault};
+pub use imperfections::Imperfections;
+pub use settings::{Clock, Settings};

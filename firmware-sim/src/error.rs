@@ -1,0 +1,45 @@
+/// Why the simulated bench cannot be built from a rig file.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SimError {
+    /// The `[sim]` table has an unknown key, or a value of the wrong type.
+    #[error("[sim]: {why}")]
+    Form {
+        /// What was found and expected.
+        why: String,
+    },
+    /// A value of the `[sim]` table is not allowed.
+    #[error("sim.{key} is {found}, allowed: {allowed}")]
+    Value {
+        /// The key.
+        key: &'static str,
+        /// What was found.
+        found: String,
+        /// What may stand there.
+        allowed: String,
+    },
+    /// The arms may not stand where they are said to start.
+    #[error("sim.start_light_deg, sim.start_sensor_deg: not a pose that the arms may take")]
+    Start {
+        /// What it would break.
+        source: arms::Violation,
+    },
+    /// The specimen is not known, or its file is no good.
+    #[error("sim.specimen: \"{name}\" cannot be put on the stage")]
+    Specimen {
+        /// As it was named.
+        name: String,
+        /// Why not.
+        source: brdf::Error,
+    },
+    /// The rig file asks for a device that is not simulated.
+    #[error("{what} {found} is not simulated, allowed: {allowed}")]
+    Device {
+        /// What about it.
+        what: &'static str,
+        /// What was asked for.
+        found: String,
+        /// What there is.
+        allowed: String,
+    },
+}

@@ -1,0 +1,223 @@
+mod device;
+mod registers;
+
+use std::time::Duration;
+
+use registers as reg;
+
+use crate::fault::{Disturbance, Schedule};
+use crate::lamp::Lamp;
+use crate::photodiodes::Exposed;
+use crate::table::Table;
+
+/// Unit of Bus Watchdog.
+const WATCHDOG_UNIT: Duration = Duration::from_millis(20);
+/// Value of Bus Watchdog once it has tripped.
+const TRIPPED: i64 = 0xFF;
+
+/// Values of Status.
+const INTEGRATING: i64 = 1;
+const READY: i64 = 2;
+const SATURATED: i64 = 3;
+
+/// How the photometer leaves the workshop.
+#[derive(Clone, Debug)]
+pub(crate) struct Fitting {
+    pub(crate) id: u8,
+    pub(crate) baud_code: u8,
+    pub(crate) boot: Duration,
+    pub(crate) ambient_c: f64,
+    /// By how much it becomes warmer than the room, °C.
+    pub(crate) self_heating_c: f64,
+}
+
+/// A running integration.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Integration {
+    pub(crate) start: Duration,
+    pub(crate) end: Duration,
+    pub(crate) gain_step: u8,
+    /// Integrations since the bench was built: the stream from which its noise is drawn.
+    pub(crate) serial: u64,
+}
+
+/// The photometer node with its lamp.
+#[derive(Debug)]
+pub(crate) struct Photometer {
+    fitting: Fitting,
+    table: Table,
+    lamp: Lamp,
+    now: Duration,
+    /// When its clock read 0.
+    booted: Duration,
+    heard: Duration,
+    deaf_until: Duration,
+    silent_until: Duration,
+    integration: Option<Integration>,
+    triggers: u64,
+    delay: Option<Duration>,
+    refuses_trigger: bool,
+    loses_acknowledgement: bool,
+    faults: Schedule,
+}
+
+impl Photometer {
+    pub(crate) fn new(fitting: Fitting, lamp: Lamp) -> Self {
+        let mut table = Table::new(reg::REGISTERS.to_vec());
+        table.set(reg::ID, i64::from(fitting.id));
+        table.set(reg::BAUD, i64::from(fitting.baud_code));
+        Self {
+            fitting,
+            table,
+            lamp,
+            now: Duration::ZERO,
+            booted: Duration::ZERO,
+            heard: Duration::ZERO,
+            deaf_until: Duration::ZERO,
+            silent_until: Duration::ZERO,
+            integration: None,
+            triggers: 0,
+            delay: None,
+            refuses_trigger: false,
+            loses_acknowledgement: false,
+            faults: Schedule::default(),
+        }
+    }
+
+    pub(crate) fn lamp(&self) -> &Lamp {
+        &self.lamp
+    }
+
+    pub(crate) fn integration(&self) -> Option<Integration> {
+        self.integration
+    }
+
+    /// °C at a moment: it warms up with a time constant of ten minutes.
+    pub(crate) fn temperature_c(&self, t_s: f64) -> f64 {
+        self.fitting.ambient_c - self.fitting.self_heating_c * (-t_s / 600.0).exp_m1()
+    }
+
+    pub(crate) fn set_wire_clock(&mut self, wire: bool) {
+        self.table.set(reg::CLOCK, i64::from(wire));
+    }
+
+    pub(crate) fn take_delay(&mut self) -> Option<Duration> {
+        self.delay.take()
+    }
+
+    pub(crate) fn take_lost_acknowledgement(&mut self) -> bool {
+        std::mem::take(&mut self.loses_acknowledgement)
+    }
+
+    pub(crate) fn schedule(&mut self, at: Duration, what: Disturbance) {
+        self.faults.push(at, what);
+    }
+
+    /// When something happens by itself next.
+    pub(crate) fn next_event(&self) -> Option<Duration> {
+        [Some(self.deaf_until), Some(self.silent_until)]
+            .into_iter()
+            .chain([
+                self.watchdog(),
+                self.faults.next(),
+                self.integration.map(|running| running.end),
+            ])
+            .flatten()
+            .filter(|&at| at > self.now)
+            .min()
+    }
+
+    fn watchdog(&self) -> Option<Duration> {
+        let units = self.table.get(reg::BUS_WATCHDOG);
+        let armed = self.lamp.on() && units != 0 && units != TRIPPED;
+        armed.then(|| self.heard + WATCHDOG_UNIT * u32::try_from(units).expect("at most 127"))
+    }
+
+    /// Lets time pass. The bench completes an integration that ends meanwhile, before it asks for more.
+    pub(crate) fn advance_to(&mut self, t: Duration) {
+        while let Some(at) = [self.watchdog(), self.faults.next()]
+            .into_iter()
+            .flatten()
+            .min()
+            .filter(|&at| at <= t)
+        {
+            self.now = self.now.max(at);
+            if self.watchdog() == Some(at) {
+                self.table.set(reg::BUS_WATCHDOG, TRIPPED);
+                self.switch_lamp(false);
+            } else if let Some(what) = self.faults.pop(at) {
+                self.suffer(what);
+            }
+        }
+        self.now = self.now.max(t);
+    }
+
+    fn suffer(&mut self, what: Disturbance) {
+        match what {
+            Disturbance::Silence(duration) => self.silent_until = self.now + duration,
+            Disturbance::HardwareError(bits) => {
+                let bits = self.table.get(reg::HARDWARE_ERROR) | i64::from(bits);
+                self.table.set(reg::HARDWARE_ERROR, bits);
+                self.switch_lamp(false);
+            }
+            Disturbance::RefusedTrigger => self.refuses_trigger = true,
+            Disturbance::LostAcknowledgement => self.loses_acknowledgement = true,
+            // A servo's.
+            Disturbance::Stall(_) => {}
+        }
+    }
+
+    fn switch_lamp(&mut self, on: bool) {
+        self.lamp.switch(self.now.as_secs_f64(), on);
+        self.table.set(reg::LAMP_ENABLE, i64::from(on));
+    }
+
+    fn trigger(&mut self) {
+        let integration = Duration::from_micros(self.table.get(reg::INTEGRATION_TIME) as u64);
+        self.integration = Some(Integration {
+            start: self.now,
+            end: self.now + integration,
+            gain_step: self.table.get(reg::GAIN_STEP) as u8,
+            serial: self.triggers,
+        });
+        self.triggers += 1;
+        let sequence = (self.table.get(reg::SEQUENCE) + 1) % reg::MODULUS as i64;
+        self.table.set(reg::SEQUENCE, sequence);
+        self.table.set(reg::STATUS, INTEGRATING);
+    }
+
+    /// Ends the running integration with what it collected.
+    pub(crate) fn complete(&mut self, exposed: Exposed) {
+        let Some(done) = self.integration.take() else {
+            return;
+        };
+        let middle = done.start + (done.end - done.start) / 2;
+        let values = [
+            (reg::READING_GAIN, i64::from(done.gain_step)),
+            (
+                reg::READING_INTEGRATION,
+                (done.end - done.start).as_micros() as i64,
+            ),
+            (reg::RED, i64::from(exposed.rgb[0])),
+            (reg::GREEN, i64::from(exposed.rgb[1])),
+            (reg::BLUE, i64::from(exposed.rgb[2])),
+            (reg::MONITOR, i64::from(exposed.monitor)),
+            (reg::DEVICE_TIME, self.ticks(middle)),
+            (reg::STATUS, if exposed.saturated { SATURATED } else { READY }),
+        ];
+        for (register, value) in values {
+            self.table.set(register, value);
+        }
+    }
+
+    /// The node's clock at a moment, 10 µs, 24 bits.
+    fn ticks(&self, t: Duration) -> i64 {
+        let ticks = t.saturating_sub(self.booted).as_micros() as u64 / 10;
+        (ticks % reg::MODULUS) as i64
+    }
+
+    /// Lets go of light that went out before a moment.
+    pub(crate) fn forget(&mut self, before_s: f64) {
+        self.lamp.forget(before_s);
+    }
+}

@@ -1,0 +1,206 @@
+mod device;
+mod model;
+mod motion;
+mod path;
+mod registers;
+#[cfg(test)]
+mod tests;
+
+use std::time::Duration;
+
+pub(crate) use model::Model;
+use path::Path;
+use registers as reg;
+
+use crate::fault::{Disturbance, Schedule};
+use crate::table::Table;
+
+/// Firmware that the simulated servos claim: the table with time-based profile, Clear and startup configuration.
+const FIRMWARE_VERSION: u8 = 46;
+/// Encoder counts per turn.
+const TURN: f64 = 4096.0;
+/// Unit of Bus Watchdog.
+const WATCHDOG_UNIT: Duration = Duration::from_millis(20);
+/// Value of Bus Watchdog once it has tripped.
+const TRIPPED: i64 = 0xFF;
+
+/// How a servo leaves the workshop: what the rig file and the `[sim]` table say of it.
+#[derive(Clone, Debug)]
+pub(crate) struct Fitting {
+    pub(crate) model: &'static Model,
+    pub(crate) id: u8,
+    pub(crate) baud_code: u8,
+    pub(crate) return_delay: Duration,
+    /// Servo counts between which the arm may be.
+    pub(crate) limits: [f64; 2],
+    /// Servo count at which it stands when power comes on.
+    pub(crate) start: f64,
+    /// Play between the encoder and the arm, counts.
+    pub(crate) backlash: f64,
+    /// By how much the shaft follows its profile late.
+    pub(crate) lag: Duration,
+    pub(crate) boot: Duration,
+    pub(crate) ambient_c: f64,
+}
+
+/// An X-series servo: its control table and the motion behind it.
+///
+/// Motion happens in shaft counts: where the shaft is, on a line that goes on over many turns. Position registers
+/// show that line with direction, lost turns and homing offset.
+#[derive(Debug)]
+pub(crate) struct Servo {
+    fitting: Fitting,
+    table: Table,
+    now: Duration,
+    /// The profile as the servo computes it.
+    profile: Path,
+    /// Profile type in bits 4 and 5 of Moving Status.
+    profile_type: u8,
+    /// The shaft, which follows late, or is stuck.
+    shaft: Path,
+    /// What the register does not know of the shaft's turns, counts.
+    lost_turns: f64,
+    heard: Duration,
+    deaf_until: Duration,
+    silent_until: Duration,
+    stalled_until: Option<Duration>,
+    faults: Schedule,
+}
+
+impl Servo {
+    pub(crate) fn new(fitting: Fitting) -> Self {
+        let [low, high] = fitting.limits;
+        let mut table = Table::new(reg::registers(fitting.model));
+        table.set(reg::ID, i64::from(fitting.id));
+        table.set(reg::BAUD, i64::from(fitting.baud_code));
+        table.set(reg::RETURN_DELAY, fitting.return_delay.as_micros() as i64 / 2);
+        if low < 0.0 || high >= TURN {
+            table.set(reg::OPERATING_MODE, 4);
+        } else {
+            table.set(reg::MIN_POSITION, low.floor() as i64);
+            table.set(reg::MAX_POSITION, high.ceil().min(TURN - 1.0) as i64);
+        }
+        let mut servo = Self {
+            profile: Path::resting(fitting.start, 0.0),
+            shaft: Path::resting(fitting.start, fitting.backlash / 2.0),
+            fitting,
+            table,
+            now: Duration::ZERO,
+            profile_type: 0,
+            lost_turns: 0.0,
+            heard: Duration::ZERO,
+            deaf_until: Duration::ZERO,
+            silent_until: Duration::ZERO,
+            stalled_until: None,
+            faults: Schedule::default(),
+        };
+        servo.start_up();
+        servo
+    }
+
+    /// Servo count, not whole, at which the arm behind the play is.
+    pub(crate) fn arm(&self, t_s: f64) -> f64 {
+        self.shaft.follower(t_s)
+    }
+
+    /// Moments within a stretch of time at which the motion changes its law.
+    pub(crate) fn breaks(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = f64> {
+        self.shaft.breaks(from_s, to_s)
+    }
+
+    /// Whether the shaft stands still for a stretch of time.
+    pub(crate) fn rests(&self, from_s: f64, to_s: f64) -> bool {
+        self.shaft.rests(from_s, to_s)
+    }
+
+    /// Lets go of what the shaft did before a moment.
+    pub(crate) fn forget(&mut self, before_s: f64) {
+        self.shaft.forget(before_s);
+        self.profile.forget(before_s);
+    }
+
+    pub(crate) fn schedule(&mut self, at: Duration, what: Disturbance) {
+        self.faults.push(at, what);
+    }
+
+    /// When something happens by itself next: a motion or a boot ends, the watchdog trips, a fault sets in or ends.
+    pub(crate) fn next_event(&self) -> Option<Duration> {
+        let motion_s = self.profile.end_s().max(self.shaft.end_s());
+        // Rounded up, so that the motion is over by then.
+        let motion = Duration::from_nanos((motion_s * 1e9).ceil() as u64);
+        [Some(motion), Some(self.deaf_until), Some(self.silent_until)]
+            .into_iter()
+            .chain([self.watchdog(), self.stalled_until, self.faults.next()])
+            .flatten()
+            .filter(|&at| at > self.now)
+            .min()
+    }
+
+    /// When the bus watchdog will trip.
+    fn watchdog(&self) -> Option<Duration> {
+        let units = self.table.get(reg::BUS_WATCHDOG);
+        let armed = self.torque() && units != 0 && units != TRIPPED;
+        armed.then(|| self.heard + WATCHDOG_UNIT * u32::try_from(units).expect("at most 127"))
+    }
+
+    /// Lets time pass, in the order of what happens.
+    pub(crate) fn advance_to(&mut self, t: Duration) {
+        while let Some(at) = [self.watchdog(), self.stalled_until, self.faults.next()]
+            .into_iter()
+            .flatten()
+            .min()
+            .filter(|&at| at <= t)
+        {
+            self.now = self.now.max(at);
+            if self.watchdog() == Some(at) {
+                self.table.set(reg::BUS_WATCHDOG, TRIPPED);
+                self.stand();
+            } else if self.stalled_until == Some(at) {
+                self.release();
+            } else if let Some(what) = self.faults.pop(at) {
+                self.suffer(what);
+            }
+        }
+        self.now = self.now.max(t);
+    }
+
+    fn suffer(&mut self, what: Disturbance) {
+        match what {
+            Disturbance::Silence(duration) => self.silent_until = self.now + duration,
+            Disturbance::HardwareError(bits) => {
+                let bits = self.table.get(reg::HARDWARE_ERROR) | i64::from(bits);
+                self.table.set(reg::HARDWARE_ERROR, bits);
+                if self.shut_down() {
+                    self.table.set(reg::TORQUE_ENABLE, 0);
+                    self.stand();
+                }
+            }
+            Disturbance::Stall(duration) => {
+                self.stalled_until = Some(self.now + duration);
+                let now_s = self.now.as_secs_f64();
+                self.shaft.jump(now_s, self.shaft.at(now_s).0);
+            }
+            // The photometer's.
+            Disturbance::RefusedTrigger | Disturbance::LostAcknowledgement => {}
+        }
+    }
+
+    /// Whether a hardware error that the Shutdown register names has taken the torque, until a reboot.
+    fn shut_down(&self) -> bool {
+        self.table.get(reg::HARDWARE_ERROR) & self.table.get(reg::SHUTDOWN) != 0
+    }
+
+    fn torque(&self) -> bool {
+        self.table.get(reg::TORQUE_ENABLE) == 1
+    }
+
+    /// Power comes on: turns are lost, torque is off, or on where Startup Configuration says so.
+    fn start_up(&mut self) {
+        let shaft = self.direction() * self.shaft.at(self.now.as_secs_f64()).0;
+        self.lost_turns = (shaft / TURN).floor() * TURN;
+        self.table
+            .set(reg::TORQUE_ENABLE, self.table.get(reg::STARTUP) & 1);
+        self.heard = self.now;
+        self.stand();
+    }
+}

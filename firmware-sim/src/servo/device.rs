@@ -1,0 +1,186 @@
+//! What the wire sees of a servo (e-manual, "Control Table", "Bus Watchdog"; Protocol 2.0, instructions).
+
+use std::time::Duration;
+
+use super::{Servo, TRIPPED, TURN, reg};
+use crate::table::{Access, Register};
+use crate::{Device, Refusal};
+
+/// Parameters of Clear that reset the turns of the present position.
+const CLEAR_TURNS: [u8; 5] = [0x01, 0x44, 0x58, 0x4C, 0x22];
+
+impl Device for Servo {
+    fn id(&self) -> u8 {
+        self.table.get(reg::ID) as u8
+    }
+
+    fn baud(&self) -> u32 {
+        crate::baud::rate(self.table.get(reg::BAUD) as u8)
+    }
+
+    fn return_delay(&self) -> Duration {
+        Duration::from_micros(2 * self.table.get(reg::RETURN_DELAY) as u64)
+    }
+
+    fn status_return_level(&self) -> u8 {
+        self.table.get(reg::STATUS_RETURN_LEVEL) as u8
+    }
+
+    fn alert(&self) -> bool {
+        self.table.get(reg::HARDWARE_ERROR) != 0
+    }
+
+    fn listens(&self) -> bool {
+        self.now >= self.deaf_until && self.now >= self.silent_until
+    }
+
+    fn heard(&mut self) {
+        self.heard = self.now;
+    }
+
+    fn read(&self, address: u16, length: u16) -> Result<Vec<u8>, Refusal> {
+        self.table.check_stretch(address, usize::from(length))?;
+        let live = self.live();
+        Ok((address..address + length)
+            .map(|address| live.byte(self.target(address)))
+            .collect())
+    }
+
+    fn write(&mut self, address: u16, bytes: &[u8]) -> Result<(), Refusal> {
+        self.table.check_stretch(address, bytes.len())?;
+        let mut values = Vec::new();
+        for (address, bytes) in self.direct(address, bytes) {
+            values.extend(self.table.parse(address, &bytes)?);
+        }
+        self.check(&values)?;
+        for (register, value) in values {
+            self.apply(register, value);
+        }
+        Ok(())
+    }
+
+    fn reboot(&mut self) {
+        self.table.reset(|register| register.access != Access::Eeprom);
+        self.deaf_until = self.now + self.fitting.boot;
+        self.start_up();
+    }
+
+    fn clear(&mut self, parameters: &[u8]) -> Result<(), Refusal> {
+        if parameters != CLEAR_TURNS {
+            return Err(Refusal::DataRange);
+        }
+        if self.moves() {
+            return Err(Refusal::Result);
+        }
+        let shaft = self.direction() * self.shaft.at(self.now.as_secs_f64()).0;
+        self.lost_turns = (shaft / TURN).floor() * TURN;
+        self.stand();
+        Ok(())
+    }
+
+    fn factory_reset(&mut self, option: u8) -> Result<(), Refusal> {
+        let kept: &[Register] = match option {
+            0xFF => &[],
+            1 => &[reg::ID],
+            2 => &[reg::ID, reg::BAUD],
+            _ => return Err(Refusal::DataRange),
+        };
+        self.table
+            .reset(|register| !kept.iter().any(|kept| kept.address == register.address));
+        self.reboot();
+        Ok(())
+    }
+}
+
+impl Servo {
+    /// Where an address leads: itself, or what its indirect address register says. One level deep; the cells of the
+    /// indirect areas are what they are unless mapped.
+    fn target(&self, address: u16) -> u16 {
+        reg::indirect(address).map_or(address, |register| self.table.get(register) as u16)
+    }
+
+    /// A write as writes to whole stretches of direct addresses.
+    fn direct(&self, address: u16, bytes: &[u8]) -> Vec<(u16, Vec<u8>)> {
+        let mut stretches: Vec<(u16, Vec<u8>)> = Vec::new();
+        for (address, &byte) in (address..).zip(bytes) {
+            let target = self.target(address);
+            match stretches.last_mut() {
+                Some((start, stretch)) if usize::from(*start) + stretch.len() == usize::from(target) => {
+                    stretch.push(byte);
+                }
+                _ => stretches.push((target, vec![byte])),
+            }
+        }
+        stretches
+    }
+
+    /// Checks values that are within their registers' ranges against the state of the servo, before any is taken.
+    fn check(&self, values: &[(Register, i64)]) -> Result<(), Refusal> {
+        let tripped = self.table.get(reg::BUS_WATCHDOG) == TRIPPED;
+        values.iter().try_for_each(|&(register, value)| {
+            let is = |other: Register| register.address == other.address;
+            let within = |limit: Register| value.abs() <= self.table.get(limit);
+            if register.access == Access::Eeprom && self.torque() {
+                return Err(Refusal::Access);
+            }
+            if tripped && (reg::GOALS.into_iter().any(is) || is(reg::BUS_WATCHDOG) && value != 0) {
+                return Err(Refusal::DataRange);
+            }
+            if is(reg::OPERATING_MODE) && ![0, 1, 3, 4, 5, 16].contains(&value) {
+                return Err(Refusal::DataRange);
+            }
+            let kept = if is(reg::GOAL_PWM) {
+                within(reg::PWM_LIMIT)
+            } else if is(reg::GOAL_CURRENT) {
+                within(reg::CURRENT_LIMIT)
+            } else if is(reg::GOAL_VELOCITY) {
+                within(reg::VELOCITY_LIMIT)
+            } else if is(reg::GOAL_POSITION) {
+                self.goal_limits()
+                    .is_none_or(|(min, max)| (min..=max).contains(&value))
+            } else {
+                true
+            };
+            if kept { Ok(()) } else { Err(Refusal::DataLimit) }
+        })
+    }
+
+    fn apply(&mut self, register: Register, value: i64) {
+        if register.address == reg::TORQUE_ENABLE.address {
+            self.switch_torque(value == 1);
+        } else if register.address == reg::GOAL_POSITION.address {
+            if self.shut_down() {
+                return;
+            }
+            if self.table.get(reg::DRIVE_MODE) & 8 != 0 {
+                self.switch_torque(true);
+            }
+            self.table.set(register, value);
+            self.set_off();
+        } else {
+            self.table.set(register, value);
+            if register.access == Access::Eeprom {
+                self.remap();
+            }
+        }
+    }
+
+    /// Torque comes on with the goal at the present position; after a shutdown it does not come on until a reboot.
+    fn switch_torque(&mut self, on: bool) {
+        if on == self.torque() || on && self.shut_down() {
+            return;
+        }
+        self.table.set(reg::TORQUE_ENABLE, i64::from(on));
+        self.heard = self.now;
+        self.stand();
+    }
+
+    /// Direction, mode or offset may have changed: a single turn counts from 0 again.
+    fn remap(&mut self) {
+        if self.goal_limits().is_some() {
+            let shaft = self.direction() * self.shaft.at(self.now.as_secs_f64()).0;
+            self.lost_turns = (shaft / TURN).floor() * TURN;
+        }
+        self.stand();
+    }
+}

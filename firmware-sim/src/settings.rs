@@ -1,0 +1,210 @@
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+use std::time::Duration;
+
+use arms::Pose;
+use rig::RigFile;
+use serde::Deserialize;
+
+use crate::{Imperfections, SimError};
+
+/// How a simulated bench behind the wire keeps time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Clock {
+    /// By what happens on the wire: bytes, return delays, reply deadlines and the Delay register.
+    Wire,
+    /// Real time.
+    Real,
+}
+
+/// The `[sim]` table of a rig file, checked. Every key, its unit, default and range stand in config/rig.toml.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// What lies on the stage, in the words of [`brdf::specimen`].
+    pub specimen: String,
+    /// Seed of every random effect.
+    pub seed: u64,
+    /// How time passes behind the wire.
+    pub clock: Clock,
+    /// By how much the bench is not ideal.
+    pub imperfections: Imperfections,
+    /// How long a device is deaf after a reboot.
+    pub boot: Duration,
+    /// Where the arms stand when power comes on.
+    pub start: Pose,
+    /// Temperature of the room, °C.
+    pub ambient_c: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Preset {
+    Default,
+    None,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Raw {
+    /// Faults on the wire, which the wire reads itself.
+    #[serde(rename = "wire")]
+    _wire: Option<serde::de::IgnoredAny>,
+    specimen: Option<String>,
+    seed: Option<i64>,
+    clock: Option<Clock>,
+    imperfections: Option<Preset>,
+    boot_ms: Option<f64>,
+    start_light_deg: Option<f64>,
+    start_sensor_deg: Option<f64>,
+    ambient_c: Option<f64>,
+    shot_noise_electrons: Option<f64>,
+    read_noise_counts: Option<f64>,
+    dark_counts_per_s: Option<f64>,
+    dark_doubling_c: Option<f64>,
+    dark_offset_counts: Option<f64>,
+    self_heating_c: Option<f64>,
+    stray_per_sr: Option<f64>,
+    lamp_warm_up_ms: Option<f64>,
+    lamp_drift: Option<f64>,
+    lamp_flicker: Option<f64>,
+    source_aperture_deg: Option<f64>,
+    detector_aperture_deg: Option<f64>,
+    light_backlash_deg: Option<f64>,
+    sensor_backlash_deg: Option<f64>,
+    following_lag_ms: Option<f64>,
+}
+
+impl Settings {
+    /// Checks the `[sim]` table of a rig file.
+    ///
+    /// # Errors
+    /// An unknown key, a wrong type, a value out of its range, a start that the envelope forbids.
+    pub fn new(rig: &RigFile) -> Result<Self, SimError> {
+        let raw: Raw = rig
+            .sim
+            .clone()
+            .try_into()
+            .map_err(|error: toml::de::Error| SimError::Form {
+                why: error.message().to_owned(),
+            })?;
+        let start = Pose::from_deg(
+            within("start_light_deg", raw.start_light_deg, -45.0, -90.0..=90.0)?,
+            within("start_sensor_deg", raw.start_sensor_deg, 45.0, -90.0..=90.0)?,
+        );
+        rig.envelope
+            .check_pose(start)
+            .map_err(|source| SimError::Start { source })?;
+        Ok(Self {
+            seed: within("seed", raw.seed, 1, 0..=i64::MAX)?.unsigned_abs(),
+            boot: ms("boot_ms", raw.boot_ms, 500.0, 10_000.0)?,
+            ambient_c: within("ambient_c", raw.ambient_c, 23.0, 0.0..=60.0)?,
+            imperfections: imperfections(&raw)?,
+            clock: raw.clock.unwrap_or(Clock::Wire),
+            specimen: raw.specimen.unwrap_or_else(|| "gold-paint".to_owned()),
+            start,
+        })
+    }
+}
+
+fn imperfections(raw: &Raw) -> Result<Imperfections, SimError> {
+    let base = match raw.imperfections {
+        None | Some(Preset::Default) => Imperfections::DEFAULT,
+        Some(Preset::None) => Imperfections::NONE,
+    };
+    let amount = |key, value, base, max| within(key, value, base, 0.0..=max);
+    Ok(Imperfections {
+        shot_noise_electrons: amount(
+            "shot_noise_electrons",
+            raw.shot_noise_electrons,
+            base.shot_noise_electrons,
+            1e6,
+        )?,
+        read_noise_counts: amount(
+            "read_noise_counts",
+            raw.read_noise_counts,
+            base.read_noise_counts,
+            1e4,
+        )?,
+        dark_counts_per_s: amount(
+            "dark_counts_per_s",
+            raw.dark_counts_per_s,
+            base.dark_counts_per_s,
+            1e6,
+        )?,
+        dark_doubling_c: amount(
+            "dark_doubling_c",
+            raw.dark_doubling_c,
+            base.dark_doubling_c,
+            100.0,
+        )?,
+        dark_offset_counts: amount(
+            "dark_offset_counts",
+            raw.dark_offset_counts,
+            base.dark_offset_counts,
+            1e5,
+        )?,
+        self_heating_c: amount("self_heating_c", raw.self_heating_c, base.self_heating_c, 50.0)?,
+        stray_per_sr: amount("stray_per_sr", raw.stray_per_sr, base.stray_per_sr, 1.0)?,
+        lamp_warm_up: ms(
+            "lamp_warm_up_ms",
+            raw.lamp_warm_up_ms,
+            base.lamp_warm_up.as_secs_f64() * 1e3,
+            60_000.0,
+        )?,
+        lamp_drift: amount("lamp_drift", raw.lamp_drift, base.lamp_drift, 0.5)?,
+        lamp_flicker: amount("lamp_flicker", raw.lamp_flicker, base.lamp_flicker, 0.5)?,
+        source_aperture_deg: amount(
+            "source_aperture_deg",
+            raw.source_aperture_deg,
+            base.source_aperture_deg,
+            10.0,
+        )?,
+        detector_aperture_deg: amount(
+            "detector_aperture_deg",
+            raw.detector_aperture_deg,
+            base.detector_aperture_deg,
+            10.0,
+        )?,
+        light_backlash_deg: amount(
+            "light_backlash_deg",
+            raw.light_backlash_deg,
+            base.light_backlash_deg,
+            5.0,
+        )?,
+        sensor_backlash_deg: amount(
+            "sensor_backlash_deg",
+            raw.sensor_backlash_deg,
+            base.sensor_backlash_deg,
+            5.0,
+        )?,
+        following_lag: ms(
+            "following_lag_ms",
+            raw.following_lag_ms,
+            base.following_lag.as_secs_f64() * 1e3,
+            500.0,
+        )?,
+    })
+}
+
+/// A value within a range, or its default; NaN is in none.
+fn within<T: PartialOrd + Display>(
+    key: &'static str,
+    value: Option<T>,
+    default: T,
+    range: RangeInclusive<T>,
+) -> Result<T, SimError> {
+    let value = value.unwrap_or(default);
+    if range.contains(&value) {
+        return Ok(value);
+    }
+    Err(SimError::Value {
+        key,
+        found: value.to_string(),
+        allowed: format!("{} … {}", range.start(), range.end()),
+    })
+}
+
+fn ms(key: &'static str, value: Option<f64>, default: f64, max: f64) -> Result<Duration, SimError> {
+    within(key, value, default, 0.0..=max).map(|ms| Duration::from_secs_f64(ms / 1e3))
+}
