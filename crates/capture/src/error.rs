@@ -1,5 +1,7 @@
 use std::path::PathBuf;
 
+use rig::Identity;
+
 /// Why a journal could not be written or read.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -30,4 +32,34 @@ pub enum JournalError {
         /// What was found.
         why: String,
     },
+}
+
+/// Why a plan could not be run, or not further.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum CaptureError {
+    /// The journal does not begin with a header.
+    #[error("the journal has no header, so no plan")]
+    NoHeader,
+    /// A run is to go on with other devices than it began with. Nothing moved.
+    #[error("the run began with {}, now there are {}", list(.recorded), list(.found))]
+    OtherDevices {
+        /// Who answered when it began.
+        recorded: Vec<Identity>,
+        /// Who answers now.
+        found: Vec<Identity>,
+    },
+    /// The journal cannot be written any more. What it holds is sound, and the run can be resumed.
+    #[error("readings can no longer be recorded")]
+    Journal(#[from] JournalError),
+}
+
+fn list(identities: &[Identity]) -> String {
+    let names = identities.iter().map(|identity| {
+        format!(
+            "{} (id {}, firmware {})",
+            identity.model, identity.id, identity.firmware
+        )
+    });
+    names.collect::<Vec<_>>().join(", ")
 }

@@ -3,12 +3,22 @@
 //! The executor is one loop over the steps of a plan; the journal is what is true. Only tokio time is used, so a
 //! whole capture runs under a paused clock against the in-process rig. Nothing here knows of reconstruction.
 
+mod clock;
 mod error;
+mod event;
+mod execution;
+mod exposure;
 mod file_journal;
 mod journal;
+mod mechanics;
+mod progress;
 mod reading;
+mod run;
 
-pub use error::JournalError;
+pub use error::{CaptureError, JournalError};
+pub use event::{Command, Event, State};
 pub use file_journal::FileJournal;
 pub use journal::{Header, Journal, Outcome, Record};
+pub use mechanics::mechanics;
 pub use reading::{Flag, Reading};
+pub use run::run;

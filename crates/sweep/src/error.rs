@@ -38,6 +38,17 @@ pub enum SweepError {
         /// What that breaks.
         source: Violation,
     },
+    /// No motion inside the envelope leads from one pose to the other.
+    #[error(
+        "no safe way leads from light {:.2}°, sensor {:.2}° to light {:.2}°, sensor {:.2}°",
+        .from.light.deg(), .from.sensor.deg(), .to.light.deg(), .to.sensor.deg()
+    )]
+    NoWay {
+        /// Where the arms stand.
+        from: Pose,
+        /// Where they should go.
+        to: Pose,
+    },
     /// A motion of the finished plan would break the envelope. The planner avoids that; this is its last look.
     #[error("step {step} of the plan would break the envelope")]
     Leg {

@@ -19,3 +19,4 @@ pub use job::{Arc, Distribution, Job, Model, Plane};
 pub use mechanics::Mechanics;
 pub use plan::{LeftOut, Plan, Step, Sweep};
 pub use planner::plan;
+pub use route::way;

@@ -1,4 +1,4 @@
-use arms::{Arm, Pose};
+use arms::Pose;
 
 use crate::order::order;
 use crate::reach::Reach;
@@ -23,7 +23,7 @@ const DARK_REPEATS: usize = 4;
 pub fn plan(job: &Job, mechanics: &Mechanics) -> Result<Plan, SweepError> {
     let start = mechanics
         .start
-        .map(|pose| standing(mechanics, pose))
+        .map(|pose| Standing::measured(mechanics, pose))
         .transpose()?;
     let reach = Reach::new(mechanics, start.map(|start| start.pose));
     let mut sweeps: Vec<Targets> = (0..job.planes.len())
@@ -71,25 +71,6 @@ pub fn plan(job: &Job, mechanics: &Mechanics) -> Result<Plan, SweepError> {
     Ok(plan)
 }
 
-/// Where the arms stand, on the servos' grid. They need not stand still to a count, so one step outside is inside.
-fn standing(mechanics: &Mechanics, pose: Pose) -> Result<Standing, SweepError> {
-    let mut nearest = pose;
-    for arm in Arm::BOTH {
-        let limits = mechanics.envelope.limits(arm);
-        let steps = mechanics.steps(arm, pose.angle(arm)).round();
-        let candidates = [0.0, 1.0, -1.0].map(|step| mechanics.angle(arm, steps + step));
-        let inside = candidates.into_iter().find(|&angle| limits.contain(angle));
-        nearest = nearest.with(arm, inside.unwrap_or(candidates[0]));
-    }
-    match mechanics.envelope.check_pose(nearest) {
-        Ok(()) => Ok(Standing {
-            pose: nearest,
-            approached: false,
-        }),
-        Err(source) => Err(SweepError::Start { pose, source }),
-    }
-}
-
 /// A plan in the making: its steps, and where the arms stand after them.
 struct Draft<'a> {
     mechanics: &'a Mechanics,
@@ -103,7 +84,9 @@ impl Draft<'_> {
         for gain in 0..GAINS {
             for integration_us in self.mechanics.integration_us {
                 for _ in 0..DARK_REPEATS {
-                    let seconds = f64::from(integration_us) * 1e-6 + self.mechanics.transaction_s;
+                    let seconds = self.mechanics.settle_s
+                        + f64::from(integration_us) * 1e-6
+                        + self.mechanics.transaction_s;
                     self.push(
                         Sweep::Dark,
                         vec![self.standing.pose],

@@ -1,6 +1,6 @@
 use arms::{Arm, ArmAngle, Pose};
 
-use crate::Mechanics;
+use crate::{Mechanics, SweepError};
 
 /// Where the arms stand between two steps.
 #[derive(Clone, Copy, Debug)]
@@ -11,6 +11,30 @@ pub(crate) struct Standing {
     pub(crate) approached: bool,
 }
 
+impl Standing {
+    /// From a measured pose, put on the servos' grid. Arms do not stand still to a count, so where one is a step
+    /// outside its limits the step inside is meant.
+    pub(crate) fn measured(mechanics: &Mechanics, measured: Pose) -> Result<Self, SweepError> {
+        let pose = Arm::BOTH.into_iter().fold(measured, |pose, arm| {
+            let limits = mechanics.envelope.limits(arm);
+            let steps = mechanics.steps(arm, measured.angle(arm)).round();
+            let candidates = [0.0, 1.0, -1.0].map(|step| mechanics.angle(arm, steps + step));
+            let inside = candidates.into_iter().find(|&angle| limits.contain(angle));
+            pose.with(arm, inside.unwrap_or(candidates[0]))
+        });
+        match mechanics.envelope.check_pose(pose) {
+            Ok(()) => Ok(Self {
+                pose,
+                approached: false,
+            }),
+            Err(source) => Err(SweepError::Start {
+                pose: measured,
+                source,
+            }),
+        }
+    }
+}
+
 /// A checked way from one pose to another.
 #[derive(Clone, Debug)]
 pub(crate) struct Route {
@@ -18,6 +42,17 @@ pub(crate) struct Route {
     pub(crate) path: Vec<Pose>,
     /// Seconds of motion.
     pub(crate) seconds: f64,
+}
+
+/// The way from where the arms measurably stand to a pose: waypoints, then the pose itself, every leg inside the
+/// envelope, the last one in the direction of approach.
+///
+/// # Errors
+/// The arms stand outside the envelope, or no safe way leads to the pose.
+pub fn way(mechanics: &Mechanics, from: Pose, to: Pose) -> Result<Vec<Pose>, SweepError> {
+    let standing = Standing::measured(mechanics, from)?;
+    let route = route(mechanics, standing, to).ok_or(SweepError::NoWay { from, to })?;
+    Ok(route.path)
 }
 
 /// The way to a pose: with the last approach from the side that the rig file asks for, and with every leg inside the

@@ -1,0 +1,76 @@
+use arms::Pose;
+use serde::Serialize;
+use sweep::Sweep;
+
+use crate::Reading;
+
+/// What an operator asks of a running capture; sent over a `tokio::sync::watch` channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Command {
+    /// Go on.
+    #[default]
+    Run,
+    /// Finish the reading and hold, lamp on, until told otherwise.
+    Pause,
+    /// Finish the reading, hold the arms, lamp off, end; the run can be resumed.
+    Stop,
+    /// Stop the arms at once as the rig file says, lamp off, end.
+    Estop,
+}
+
+/// What a capture is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum State {
+    /// Asking every device who it is; nothing moves.
+    Identifying,
+    /// Torque on, goals at the present position.
+    Engaging,
+    /// The lamp is on and not yet steady.
+    WarmingUp,
+    /// Moving and reading.
+    Running,
+    /// Holding, on the operator's wish.
+    Paused,
+    /// Lamp off, arms stopped and disengaged.
+    ShuttingDown,
+}
+
+/// What happens in a capture, for whoever watches it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case", tag = "event")]
+pub enum Event {
+    /// It does something else now.
+    State {
+        /// What.
+        state: State,
+    },
+    /// A step begins.
+    Step {
+        /// Its index in the plan.
+        step: usize,
+        /// Steps of the plan.
+        of: usize,
+        /// What it belongs to.
+        sweep: Sweep,
+        /// Where its reading is to be taken.
+        goal: Pose,
+    },
+    /// A reading was taken and is durable, accepted or not.
+    Reading {
+        /// The reading.
+        reading: Box<Reading>,
+    },
+    /// How far it is.
+    Progress {
+        /// Steps with an accepted reading.
+        done: usize,
+        /// Steps of the plan.
+        of: usize,
+        /// Seconds of rig time still needed, as planned and corrected by what was measured so far.
+        seconds_left: f64,
+        /// Requests on the bus that had to be repeated so far.
+        retries: u32,
+    },
+}

@@ -1,0 +1,404 @@
+use std::time::{Duration, SystemTime};
+
+use rig::{Drive, DriveError, Exposure, Gain, Identity, Rig, RigFile};
+use sweep::{Plan, Step, SweepError};
+use tokio::sync::watch;
+
+use crate::clock::DeviceClock;
+use crate::exposure::Ranging;
+use crate::progress::Progress;
+use crate::{
+    CaptureError, Command, Event, Flag, Journal, JournalError, Outcome, Reading, Record, State, mechanics,
+};
+
+/// Most exposures of one reading in one execution: from one end of the range to the other takes six, by a factor of
+/// about 16 each.
+const MAX_EXPOSURES: u32 = 8;
+/// Longest time for which an operator's command is not looked at, and between two looks at a paused rig; well below
+/// the watchdogs.
+const LOOK: Duration = Duration::from_millis(200);
+/// Ticks of the photometer's clock per second.
+const TICKS_PER_S: f64 = 1e5;
+
+/// Why an execution ends before its last step.
+#[derive(Debug)]
+pub(crate) enum Interrupt<E: rig::Fault> {
+    Stop,
+    Estop,
+    Fault(DriveError<E>),
+    Way(SweepError),
+    Refused(CaptureError),
+}
+
+impl<E: rig::Fault> From<DriveError<E>> for Interrupt<E> {
+    fn from(error: DriveError<E>) -> Self {
+        Self::Fault(error)
+    }
+}
+
+impl<E: rig::Fault> From<JournalError> for Interrupt<E> {
+    fn from(error: JournalError) -> Self {
+        Self::Refused(CaptureError::Journal(error))
+    }
+}
+
+/// One execution of a plan, from who-are-you to lamp off.
+pub(crate) struct Execution<'a, R: Rig> {
+    plan: &'a Plan,
+    file: &'a RigFile,
+    drive: &'a mut Drive<R>,
+    journal: &'a mut dyn Journal,
+    control: watch::Receiver<Command>,
+    on_event: &'a mut (dyn FnMut(Event) + Send),
+    /// Whether each step has an accepted reading.
+    done: Vec<bool>,
+    /// Readings of each step so far, accepted or not.
+    attempts: Vec<u32>,
+    ranging: Ranging<'a>,
+    progress: Progress,
+    clock: DeviceClock,
+    /// Device time at the end of the last step.
+    mark: u64,
+    lamp: bool,
+    /// Whether the arms stand where the plan left them, so that a step's own path leads on.
+    on_path: bool,
+}
+
+impl<'a, R: Rig> Execution<'a, R> {
+    pub(crate) fn new(
+        plan: &'a Plan,
+        file: &'a RigFile,
+        drive: &'a mut Drive<R>,
+        journal: &'a mut dyn Journal,
+        control: watch::Receiver<Command>,
+        on_event: &'a mut (dyn FnMut(Event) + Send),
+    ) -> Self {
+        let mut done = vec![false; plan.steps.len()];
+        let mut attempts = vec![0; plan.steps.len()];
+        let mut ranging = Ranging::new(&file.photometer);
+        for reading in readings(journal.records()) {
+            // What refers to no step of the plan cannot count for one.
+            let Some(attempts) = attempts.get_mut(reading.step) else {
+                continue;
+            };
+            *attempts += 1;
+            if reading.accepted {
+                done[reading.step] = true;
+                ranging.learn(reading);
+            }
+        }
+        let progress = Progress::new(plan, |step| done[step]);
+        Self {
+            plan,
+            file,
+            drive,
+            journal,
+            control,
+            on_event,
+            done,
+            attempts,
+            ranging,
+            progress,
+            clock: DeviceClock::default(),
+            mark: 0,
+            lamp: false,
+            on_path: false,
+        }
+    }
+
+    /// Everything up to the last reading.
+    pub(crate) async fn all(&mut self) -> Result<(), Interrupt<R::Error>> {
+        self.state(State::Identifying);
+        self.begin().await?;
+        self.state(State::Engaging);
+        self.drive.engage_all().await?;
+        self.state(State::Running);
+        self.report_progress();
+        let plan = self.plan;
+        for step in &plan.steps {
+            if self.done[step.index] {
+                self.on_path = false;
+                continue;
+            }
+            self.obey().await?;
+            self.step(step).await?;
+        }
+        Ok(())
+    }
+
+    /// Asks every device who it is and when, and records it.
+    async fn begin(&mut self) -> Result<(), Interrupt<R::Error>> {
+        let found: Vec<Identity> = self.drive.identify_all().await?.into();
+        let recorded = self.journal.records().iter().find_map(|record| match record {
+            Record::Begin { identities, .. } => Some(identities.clone()),
+            _ => None,
+        });
+        if let Some(recorded) = recorded.filter(|recorded| *recorded != found) {
+            return Err(Interrupt::Refused(CaptureError::OtherDevices { recorded, found }));
+        }
+        let ticks = self.drive.ticks().await?;
+        self.clock = DeviceClock::new(last_ticks(self.journal.records()), ticks);
+        self.mark = self.clock.last();
+        self.journal.append(&Record::Begin {
+            identities: found,
+            device_ticks: self.mark,
+            at: now(),
+        })?;
+        Ok(())
+    }
+
+    /// One step: lamp, motion, and exposures until one is accepted.
+    async fn step(&mut self, step: &Step) -> Result<(), Interrupt<R::Error>> {
+        self.emit(Event::Step {
+            step: step.index,
+            of: self.plan.steps.len(),
+            sweep: step.sweep,
+            goal: step.pose(),
+        });
+        if step.lamp != self.lamp {
+            self.switch_lamp(step.lamp).await?;
+        }
+        let mut retries = self.drive.retries();
+        let measured = self.travel(step).await?;
+        let fixed = step.exposure.map(|(gain, integration_us)| Exposure {
+            integration_us,
+            gain: Gain::ALL[usize::from(gain).min(Gain::ALL.len() - 1)],
+        });
+        let mut exposure = fixed.unwrap_or_else(|| self.ranging.first(step.sweep, step.pose()));
+        for left in (0..MAX_EXPOSURES).rev() {
+            let counts = self.drive.expose(exposure).await?;
+            let better = match fixed {
+                None if left > 0 => self.ranging.better(&counts),
+                _ => None,
+            };
+            let mut reading = Reading {
+                step: step.index,
+                attempt: self.attempts[step.index],
+                accepted: better.is_none(),
+                sweep: step.sweep,
+                lamp: step.lamp,
+                goal: step.pose(),
+                measured,
+                counts,
+                device_ticks: self.clock.unwrap(counts.ticks),
+                retries: self.drive.retries() - retries,
+                flags: Vec::new(),
+            };
+            reading.flags = self.flags(&reading);
+            retries = self.drive.retries();
+            self.record(reading, step)?;
+            match better {
+                Some(better) => exposure = better,
+                None => break,
+            }
+        }
+        Ok(())
+    }
+
+    /// Drives to a step's pose; from wherever the arms are where its own path does not lead on.
+    async fn travel(&mut self, step: &Step) -> Result<arms::Pose, Interrupt<R::Error>> {
+        let snapshot = if self.on_path {
+            self.drive.travel(&step.path).await?
+        } else {
+            let from = self.drive.snapshot().await?.pose();
+            let mechanics = mechanics(self.file, Some(from));
+            let path = sweep::way(&mechanics, from, step.pose()).map_err(Interrupt::Way)?;
+            self.drive.travel(&path).await?
+        };
+        self.on_path = true;
+        Ok(snapshot.pose())
+    }
+
+    fn flags(&self, reading: &Reading) -> Vec<Flag> {
+        let dim = reading.lamp && self.ranging.dim(&reading.counts);
+        [
+            (reading.counts.saturated, Flag::Saturated),
+            (dim && !reading.counts.saturated, Flag::Dim),
+            (reading.retries > 0, Flag::Retried),
+        ]
+        .into_iter()
+        .filter_map(|(is, flag)| is.then_some(flag))
+        .collect()
+    }
+
+    /// Makes a reading durable, then known.
+    fn record(&mut self, reading: Reading, step: &Step) -> Result<(), Interrupt<R::Error>> {
+        self.journal.append(&Record::Reading(reading.clone()))?;
+        self.attempts[step.index] += 1;
+        let accepted = reading.accepted;
+        if accepted {
+            self.ranging.learn(&reading);
+            self.done[step.index] = true;
+            let passed = reading.device_ticks.saturating_sub(self.mark);
+            self.mark = reading.device_ticks;
+            self.progress.step(step.seconds, passed as f64 / TICKS_PER_S);
+        }
+        self.emit(Event::Reading {
+            reading: Box::new(reading),
+        });
+        if accepted {
+            self.report_progress();
+        }
+        Ok(())
+    }
+
+    /// Switches the lamp, and waits for steady light.
+    async fn switch_lamp(&mut self, on: bool) -> Result<(), Interrupt<R::Error>> {
+        self.drive.lamp(on).await?;
+        self.lamp = on;
+        if on {
+            self.state(State::WarmingUp);
+            let mut left = self.file.photometer.lamp_warm_up;
+            while !left.is_zero() {
+                self.obey().await?;
+                let slice = left.min(LOOK);
+                self.drive.wait(slice).await?;
+                left -= slice;
+                self.look_at_clock().await?;
+            }
+            let now = self.look_at_clock().await?;
+            self.progress
+                .step(self.plan.overhead_s, (now - self.mark) as f64 / TICKS_PER_S);
+            self.mark = now;
+            self.state(State::Running);
+        }
+        Ok(())
+    }
+
+    /// Does what the operator asked for since the last look; returns when the capture is to go on.
+    async fn obey(&mut self) -> Result<(), Interrupt<R::Error>> {
+        let mut paused = false;
+        loop {
+            let command = *self.control.borrow_and_update();
+            match command {
+                Command::Run => break,
+                Command::Stop => return Err(Interrupt::Stop),
+                Command::Estop => return Err(Interrupt::Estop),
+                Command::Pause => {}
+            }
+            if !paused {
+                paused = true;
+                self.state(State::Paused);
+            }
+            // The host's clock, since a simulator's runs ahead only when told to wait. The look keeps the watchdogs
+            // from tripping.
+            let _ = tokio::time::timeout(LOOK, self.control.changed()).await;
+            self.drive.snapshot().await?;
+            self.mark = self.look_at_clock().await?;
+        }
+        if paused {
+            self.state(State::Running);
+        }
+        Ok(())
+    }
+
+    /// Reads the photometer's clock, so that no wrap is missed.
+    async fn look_at_clock(&mut self) -> Result<u64, Interrupt<R::Error>> {
+        let ticks = self.drive.ticks().await?;
+        Ok(self.clock.unwrap(ticks))
+    }
+
+    /// Makes the rig safe and records how it ended.
+    pub(crate) async fn finish(
+        mut self,
+        result: Result<(), Interrupt<R::Error>>,
+    ) -> Result<Outcome, CaptureError> {
+        self.state(State::ShuttingDown);
+        let at_rest = matches!(result, Ok(()) | Err(Interrupt::Stop));
+        let unsafe_left = match result {
+            _ if at_rest => self.drive.disengage_all().await,
+            Err(Interrupt::Estop) => {
+                let mut failed = self.drive.halt_all().await;
+                failed.extend(self.drive.disengage_all().await);
+                failed
+            }
+            _ => self.stop().await,
+        };
+        for error in &unsafe_left {
+            tracing::warn!("while shutting down: {}", chain(error));
+        }
+        let mut outcome = match result {
+            Ok(()) => Outcome::Done,
+            Err(Interrupt::Stop) => Outcome::Stopped,
+            Err(Interrupt::Estop) => Outcome::Failed {
+                fault: "emergency stop".to_owned(),
+            },
+            Err(Interrupt::Fault(fault)) => Outcome::Failed { fault: chain(&fault) },
+            Err(Interrupt::Way(error)) => Outcome::Failed { fault: chain(&error) },
+            Err(Interrupt::Refused(error)) => return Err(error),
+        };
+        if let (true, Some(error)) = (at_rest, unsafe_left.first()) {
+            outcome = Outcome::Failed {
+                fault: format!("could not shut down: {}", chain(error)),
+            };
+        }
+        let device_ticks = match unsafe_left.is_empty() {
+            true => self.look_at_clock().await.ok(),
+            false => None,
+        };
+        self.journal.append(&Record::End {
+            outcome: outcome.clone(),
+            device_ticks,
+            at: now(),
+        })?;
+        Ok(outcome)
+    }
+
+    /// Makes the rig safe after a panic; the journal is left as it is.
+    pub(crate) async fn abandon(mut self) {
+        for error in self.stop().await {
+            tracing::warn!("while shutting down: {}", chain(&error));
+        }
+    }
+
+    async fn stop(&mut self) -> Vec<DriveError<R::Error>> {
+        let mut failed = self.drive.stop_all().await;
+        failed.extend(self.drive.disengage_all().await);
+        failed
+    }
+
+    fn emit(&mut self, event: Event) {
+        (self.on_event)(event);
+    }
+
+    fn state(&mut self, state: State) {
+        self.emit(Event::State { state });
+    }
+
+    fn report_progress(&mut self) {
+        self.emit(Event::Progress {
+            done: self.done.iter().filter(|&&done| done).count(),
+            of: self.done.len(),
+            seconds_left: self.progress.seconds_left(),
+            retries: self.drive.retries(),
+        });
+    }
+}
+
+fn readings(records: &[Record]) -> impl Iterator<Item = &Reading> {
+    records.iter().filter_map(|record| match record {
+        Record::Reading(reading) => Some(reading),
+        _ => None,
+    })
+}
+
+/// The last device time in a journal.
+fn last_ticks(records: &[Record]) -> Option<u64> {
+    records.iter().rev().find_map(|record| match record {
+        Record::Reading(reading) => Some(reading.device_ticks),
+        Record::Begin { device_ticks, .. } => Some(*device_ticks),
+        Record::End { device_ticks, .. } => *device_ticks,
+        Record::Header(_) => None,
+    })
+}
+
+/// Wall clock, RFC 3339, UTC.
+fn now() -> String {
+    humantime::format_rfc3339_millis(SystemTime::now()).to_string()
+}
+
+/// An error with its causes.
+fn chain(error: &dyn std::error::Error) -> String {
+    let causes = std::iter::successors(error.source(), |error| error.source());
+    causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
+}

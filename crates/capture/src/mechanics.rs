@@ -1,0 +1,37 @@
+use arms::{ArmAngle, Pose};
+use rig::{Approach, RigFile};
+use sweep::Mechanics;
+
+/// What a planner needs to know of the rig in a rig file, with the arms standing at `start`.
+pub fn mechanics(rig: &RigFile, start: Option<Pose>) -> Mechanics {
+    Mechanics {
+        envelope: rig.envelope,
+        profiles: rig.arms.each_ref().map(|arm| arm.profile),
+        resolution_rad: rig.arms.each_ref().map(|arm| arm.axis.resolution_rad()),
+        grid_rad: rig
+            .arms
+            .each_ref()
+            .map(|arm| arm.axis.nearest(ArmAngle::NORMAL).rad()),
+        approach: match rig.motion.approach {
+            Approach::None => 0,
+            Approach::Up => 1,
+            Approach::Down => -1,
+        },
+        overshoot_rad: rig.motion.overshoot_rad,
+        settle_s: rig.motion.settle.as_secs_f64(),
+        integration_us: [
+            rig.photometer.integration_min_us,
+            rig.photometer.integration_max_us,
+        ],
+        transaction_s: transaction_s(rig),
+        warm_up_s: rig.photometer.lamp_warm_up.as_secs_f64(),
+        start,
+    }
+}
+
+/// Bytes and transactions of one reading: start, snapshots until settled, trigger, status, counts.
+fn transaction_s(rig: &RigFile) -> f64 {
+    const BYTES: f64 = 300.0;
+    const BITS_PER_BYTE: f64 = 10.0;
+    BYTES * BITS_PER_BYTE / f64::from(rig.bus.baud)
+}
