@@ -51,10 +51,8 @@ impl MerlTable {
         let mut bytes = vec![0; HEADER_BYTES.max(PLANE_BYTES)];
         let mut read = 0;
         fill(&mut stream, &mut bytes[..HEADER_BYTES], &mut read)?;
-        let mut dimensions = bytes[..HEADER_BYTES]
-            .chunks_exact(4)
-            .map(|b| i32::from_le_bytes([b[0], b[1], b[2], b[3]]));
-        let found = [(); 3].map(|()| dimensions.next().expect("twelve bytes are three int32"));
+        let (words, _) = bytes[..HEADER_BYTES].as_chunks();
+        let found = std::array::from_fn(|n| i32::from_le_bytes(words[n]));
         if found != Self::SHAPE.map(|n| n as i32) {
             return Err(Error::Header { found });
         }
@@ -62,8 +60,8 @@ impl MerlTable {
         for (channel, scale) in SCALE.iter().enumerate() {
             let start = read;
             fill(&mut stream, &mut bytes[..PLANE_BYTES], &mut read)?;
-            for (at, (node, bytes)) in nodes.iter_mut().zip(bytes.chunks_exact(8)).enumerate() {
-                let value = f64::from_le_bytes(bytes.try_into().expect("chunks of eight bytes"));
+            for (at, (node, bytes)) in nodes.iter_mut().zip(bytes.as_chunks().0).enumerate() {
+                let value = f64::from_le_bytes(*bytes);
                 if !value.is_finite() {
                     let [_, rows, columns] = Self::SHAPE;
                     return Err(Error::NotFinite {

@@ -5,5 +5,9 @@
 //! Parameterization". The crate knows nothing of arms, rigs or files.
 
 mod coordinates;
+mod density;
+mod spread;
 
-pub use coordinates::Pdv;
+pub use coordinates::{Pdv, light_angle};
+pub use density::{Density, mean_reflectance};
+pub use spread::{Distribution, Spread, spread};
