@@ -1,3 +1,4 @@
+use pdv::Distribution;
 use serde::{Deserialize, Serialize};
 
 /// What is to be measured, from a checked job file.
@@ -33,19 +34,6 @@ pub struct Arc {
     pub readings: usize,
     /// Signed deviation from the mirror direction that the arc keeps, −1 … 1; 0 is the mirror direction itself.
     pub offset: f64,
-}
-
-/// How the d_p of a plane are distributed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Distribution {
-    /// Inverse CDF of the capped mean of the MERL materials mixed with a uniform share.
-    #[default]
-    Capped,
-    /// Equation 1 of the paper as it stands.
-    Paper,
-    /// Evenly over the reachable range.
-    Uniform,
 }
 
 /// Reconstruction model.

@@ -15,8 +15,9 @@ mod route;
 mod targets;
 
 pub use error::SweepError;
-pub use job::{Arc, Distribution, Job, Model, Plane};
+pub use job::{Arc, Job, Model, Plane};
 pub use mechanics::Mechanics;
+pub use pdv::Distribution;
 pub use plan::{LeftOut, Plan, Step, Sweep};
 pub use planner::plan;
 pub use route::way;
