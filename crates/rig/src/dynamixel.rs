@@ -1,5 +1,19 @@
 //! The Dynamixel implementation: register tables, the bus and its worker, the devices on it.
+//!
+//! Built on `dynamixel2` with defences; docs/adr/0001-dynamixel2-with-defences.md says which and why.
 
+mod block;
+mod bus;
+mod line;
+mod node;
+mod photometer;
+mod port;
 pub mod register;
+mod rig;
+mod servo;
 
+pub use photometer::Photometer;
+pub use port::{Adapter, Usb, ports};
 pub use register::{BAUD_RATES, MODELS, PHOTOMETER_MODEL};
+pub use rig::Dynamixel;
+pub use servo::Servo;

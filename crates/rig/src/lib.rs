@@ -19,6 +19,7 @@ pub use axis::{ACCELERATION_UNIT_RAD_S2, Axis, COUNTS_PER_TURN, VELOCITY_UNIT_RA
 pub use calibration::{Calibration, Filling};
 pub use detector::{Counts, Detector, DetectorStatus, Exposure, Gain, Phase};
 pub use drive::{Drive, DriveError};
+pub use dynamixel::{Adapter, Dynamixel, Usb, ports};
 pub use error::{Place, RigError};
 pub use fault::{Device, Fault, FaultKind};
 pub use file::{

@@ -1,0 +1,190 @@
+use std::path::Path;
+use std::time::Duration;
+
+use arms::{Arm, Pose};
+
+use super::block::{self, Block};
+use super::bus::Bus;
+use super::line::Request;
+use super::node::{BROADCAST, Node, instruction};
+use super::photometer::Photometer;
+use super::register::{photometer, servo};
+use super::servo::Servo;
+use crate::{Detector, Device, Rig, RigError, RigFile, Snapshot};
+
+/// Longest time that the photometer's Delay register takes at once (docs/photometer.md).
+const DELAY_MAX: Duration = Duration::from_secs(10);
+
+/// A rig on a Dynamixel bus.
+#[derive(Debug)]
+pub struct Dynamixel {
+    bus: Bus,
+    servos: [Servo; 2],
+    photometer: Photometer,
+    /// Whether the photometer's clock is a simulated one, once known.
+    simulated: Option<bool>,
+}
+
+impl Dynamixel {
+    /// Opens and locks a serial port for the devices of a rig file; sends nothing, moves nothing. The file's own
+    /// port is not looked at, since it may be the built-in simulator.
+    ///
+    /// # Errors
+    /// The port is missing, locked by another program, not permitted or no serial port.
+    pub fn open(port: &Path, file: &RigFile) -> Result<Self, RigError> {
+        let bus = Bus::open(port, &file.bus)?;
+        let node = |device, id| Node {
+            bus: bus.clone(),
+            device,
+            id,
+        };
+        let servo = |arm: Arm| {
+            let settings = file.arm(arm).clone();
+            Servo {
+                node: node(arm.into(), settings.id),
+                settings,
+                limits: file.envelope.limits(arm),
+                watchdog: file.motion.watchdog,
+                latency: file.bus.latency,
+                estop: file.motion.estop,
+                mapped: false,
+                engaged: false,
+            }
+        };
+        Ok(Self {
+            servos: Arm::BOTH.map(servo),
+            photometer: Photometer {
+                node: node(Device::Photometer, file.photometer.id),
+                watchdog: file.motion.watchdog,
+            },
+            simulated: None,
+            bus,
+        })
+    }
+
+    /// State of both servos and status of the photometer in one transaction.
+    async fn bulk(&mut self) -> Result<Snapshot, RigError> {
+        let [light, sensor] = [&self.servos[0].node, &self.servos[1].node];
+        let parts = [
+            (light, block::STATE),
+            (sensor, block::STATE),
+            (&self.photometer.node, block::STATUS),
+        ];
+        let mut parameters = Vec::new();
+        for (node, block) in parts {
+            parameters.push(node.id);
+            parameters.extend(block.address.to_le_bytes());
+            parameters.extend((block.length as u16).to_le_bytes());
+        }
+        let request = Request {
+            id: BROADCAST,
+            instruction: instruction::BULK_READ,
+            parameters,
+            replies: parts.map(|(node, block)| (node.id, block.length)).to_vec(),
+        };
+        let replies = self.bus.transact(request).await.map_err(|failure| {
+            let guilty = parts.iter().find(|(node, _)| node.id == failure.id);
+            guilty.map_or(light, |(node, _)| node).error(failure)
+        })?;
+        // The servos' own hardware errors are in their state.
+        if replies[2].alert {
+            let bits = self.photometer.node.hardware_error().await?;
+            if bits != 0 {
+                return Err(self.photometer.node.hardware(bits));
+            }
+        }
+        let state = |arm: Arm| block::state(&replies[arm as usize].parameters);
+        let mut snapshot = Snapshot {
+            arms: Arm::BOTH.map(|arm| self.servos[arm as usize].place(state(arm))),
+            detector: block::status(&replies[2].parameters),
+        };
+        for arm in Arm::BOTH {
+            // After a restart the map is lost and everything reads 0.
+            if !state(arm).torque {
+                let servo = &self.servos[arm as usize];
+                snapshot.arms[arm as usize] = servo.place(servo.state().await?);
+            }
+        }
+        Ok(snapshot)
+    }
+
+    async fn clock_is_simulated(&mut self) -> Result<bool, RigError> {
+        if let Some(simulated) = self.simulated {
+            return Ok(simulated);
+        }
+        let clock = self.photometer.node.ask(Block::of(photometer::CLOCK)).await?;
+        let simulated = clock.parameters[0] == 1;
+        self.simulated = Some(simulated);
+        Ok(simulated)
+    }
+}
+
+impl Rig for Dynamixel {
+    type Error = RigError;
+    type Axis = Servo;
+    type Photometer = Photometer;
+
+    fn axis(&mut self, arm: Arm) -> &mut Servo {
+        &mut self.servos[arm as usize]
+    }
+
+    fn photometer(&mut self) -> &mut Photometer {
+        &mut self.photometer
+    }
+
+    async fn start(&mut self, goals: Pose) -> Result<(), RigError> {
+        // An arm that is not engaged has no profile: it would jump.
+        if let Some(servo) = self.servos.iter().find(|servo| !servo.engaged) {
+            return Err(RigError::NotEngaged {
+                device: servo.node.device,
+            });
+        }
+        let mut parameters = servo::GOAL_POSITION.address.to_le_bytes().to_vec();
+        parameters.extend(servo::GOAL_POSITION.size.to_le_bytes());
+        for arm in Arm::BOTH {
+            let servo = &self.servos[arm as usize];
+            let counts = servo.settings.axis.counts(goals.angle(arm)).round() as i32;
+            parameters.push(servo.node.id);
+            parameters.extend(counts.to_le_bytes());
+        }
+        let request = Request {
+            id: BROADCAST,
+            instruction: instruction::SYNC_WRITE,
+            parameters,
+            replies: Vec::new(),
+        };
+        let sent = self.bus.transact(request).await;
+        sent.map_err(|failure| self.servos[0].node.error(failure))?;
+        Ok(())
+    }
+
+    async fn snapshot(&mut self) -> Result<Snapshot, RigError> {
+        if self.servos.iter().all(|servo| servo.mapped) {
+            return self.bulk().await;
+        }
+        let [light, sensor] = &mut self.servos;
+        use crate::Actuator as _;
+        Ok(Snapshot {
+            arms: [light.location().await?, sensor.location().await?],
+            detector: self.photometer.status().await?,
+        })
+    }
+
+    async fn wait(&mut self, duration: Duration) -> Result<(), RigError> {
+        if !self.clock_is_simulated().await? {
+            tokio::time::sleep(duration).await;
+            return Ok(());
+        }
+        let mut left = duration;
+        while !left.is_zero() {
+            let now = left.min(DELAY_MAX);
+            let microseconds = now.as_nanos().div_ceil(1000) as u32;
+            self.photometer
+                .node
+                .write(photometer::DELAY, &microseconds.to_le_bytes())
+                .await?;
+            left -= now;
+        }
+        Ok(())
+    }
+}
