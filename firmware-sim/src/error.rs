@@ -1,4 +1,4 @@
-/// Why the simulated bench cannot be built from a rig file.
+/// Why the simulated bench cannot be built from a rig file, or put on a pseudo-terminal.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SimError {
@@ -41,5 +41,21 @@ pub enum SimError {
         found: String,
         /// What there is.
         allowed: String,
+    },
+    /// No pseudo-terminal to be had, or no thread to serve it.
+    #[error("cannot {attempt} for the simulated bus")]
+    Terminal {
+        /// What was attempted.
+        attempt: &'static str,
+        /// Why it failed.
+        source: std::io::Error,
+    },
+    /// The stable link to the pseudo-terminal cannot be made.
+    #[error("cannot make the link {}", .path.display())]
+    Link {
+        /// The link.
+        path: std::path::PathBuf,
+        /// Why it failed.
+        source: std::io::Error,
     },
 }

@@ -14,13 +14,17 @@ mod lamp;
 mod optics;
 mod photodiodes;
 mod photometer;
+mod program;
 mod servo;
 mod settings;
 mod table;
+mod wire;
 
 pub use bench::Bench;
 pub use device::{Device, Refusal};
 pub use error::SimError;
 pub use fault::{Disturbance, Fault};
 pub use imperfections::Imperfections;
+pub use program::main;
 pub use settings::{Clock, Settings};
+pub use wire::{Counters, Server, WireFaults, WireSettings};

@@ -1,0 +1,94 @@
+use std::error::Error;
+use std::io::{IsTerminal, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+use rig::RigFile;
+use tokio::signal::unix::{SignalKind, signal};
+use tracing_subscriber::EnvFilter;
+
+use crate::{Bench, Clock, Server, WireSettings};
+
+/// A simulated Dynamixel bus on a pseudo-terminal: two servo arms (ids 1 and 2), a photometer (id 3), a lamp and a
+/// specimen. Prints the path to open; runs until it is interrupted.
+#[derive(Parser)]
+#[command(name = "firmware-sim", version)]
+struct Arguments {
+    /// Give the terminal a stable name too: a symbolic link, removed at exit.
+    #[arg(long, value_name = "PATH")]
+    link: Option<PathBuf>,
+    /// Rig file; its [sim] table describes what is simulated.
+    #[arg(long, value_name = "RIG.toml")]
+    config: Option<PathBuf>,
+    /// What lies on the stage, instead of what the rig file says: a fitted MERL material by name, "lambert:ALBEDO",
+    /// "mirror:REFLECTANCE", or the path of a MERL .binary file.
+    #[arg(long)]
+    specimen: Option<String>,
+    /// Let time go by the bytes on the wire instead of the clock on the wall.
+    #[arg(long)]
+    wire_time: bool,
+}
+
+/// Runs `firmware-sim` with the arguments of this process: serves until SIGINT or SIGTERM, then returns 0; 2 for bad
+/// arguments or a bad rig file.
+pub fn main() -> ExitCode {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
+    // A test may have set a subscriber already; then that one stays.
+    let _ = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_ansi(std::io::stderr().is_terminal())
+        .with_writer(std::io::stderr)
+        .try_init();
+    match run(Arguments::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let mut text = error.to_string();
+            let mut cause = error.source();
+            while let Some(error) = cause {
+                text = format!("{text}: {error}");
+                cause = error.source();
+            }
+            eprintln!("firmware-sim: {text}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
+    let mut rig = match &arguments.config {
+        Some(path) => RigFile::load(path)?,
+        None => RigFile::default(),
+    };
+    if let Some(specimen) = arguments.specimen {
+        rig.sim.insert("specimen".to_owned(), specimen.into());
+    }
+    let settings = WireSettings::new(&rig)?;
+    let mut bench = Bench::new(&rig)?;
+    bench.set_clock(if arguments.wire_time {
+        Clock::Wire
+    } else {
+        Clock::Real
+    });
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_io()
+        .build()?;
+    runtime.block_on(async {
+        // Before anybody can know that we run.
+        let mut interrupted = signal(SignalKind::interrupt())?;
+        let mut terminated = signal(SignalKind::terminate())?;
+        let mut server = Server::with_bench(bench, &settings)?;
+        if let Some(link) = &arguments.link {
+            server.link(link)?;
+        }
+        writeln!(std::io::stdout(), "{}", server.path().display())?;
+        tracing::info!(wire_time = arguments.wire_time, "serving");
+        tokio::select! {
+            _ = interrupted.recv() => {}
+            _ = terminated.recv() => {}
+        }
+        let counters = server.counters();
+        tracing::info!(packets = counters.packets, damaged = counters.damaged, "stopped");
+        Ok(())
+    })
+}

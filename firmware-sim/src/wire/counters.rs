@@ -1,0 +1,48 @@
+use super::instruction::{Instruction, Write};
+use super::packet::Packet;
+
+/// Goal Position of the X series, 4 bytes.
+const GOAL_POSITION: std::ops::Range<u16> = 116..120;
+
+/// What passed over the wire so far.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Bytes from the host.
+    pub bytes_in: u64,
+    /// Good packets from the host.
+    pub packets: u64,
+    /// Frames from the host whose CRC or length was wrong.
+    pub damaged: u64,
+    /// Good packets that no device heard: all deaf, or the wrong baud rate.
+    pub unheard: u64,
+    /// Goal positions among the packets, by any kind of write: motions commanded.
+    pub goals: u64,
+    /// Status packets to the host, whole or not.
+    pub replies: u64,
+    /// Status packets that a fault changed or made late.
+    pub hurt: u64,
+    /// Status packets that a fault swallowed.
+    pub dropped: u64,
+}
+
+impl Counters {
+    /// Counts a good packet from the host.
+    pub(super) fn note(&mut self, packet: &Packet, unheard: bool) {
+        self.packets += 1;
+        self.unheard += u64::from(unheard);
+        let sets_goal = |write: &Write<'_>| {
+            let end = usize::from(write.address) + write.bytes.len();
+            usize::from(write.address) < usize::from(GOAL_POSITION.end)
+                && end > usize::from(GOAL_POSITION.start)
+        };
+        self.goals += match Instruction::decode(packet) {
+            Some(Ok(Instruction::Write(write) | Instruction::RegWrite(write))) => {
+                u64::from(sets_goal(&write))
+            }
+            Some(Ok(Instruction::Writes(writes))) => {
+                writes.iter().filter(|write| sets_goal(write)).count() as u64
+            }
+            _ => 0,
+        };
+    }
+}

@@ -1,0 +1,174 @@
+use std::time::Duration;
+
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+
+use super::answer::Slot;
+use super::dispatch::Dispatcher;
+use super::packet::Packet;
+use super::parser::Parser;
+use super::{Counters, WireFaults, WireSettings};
+use crate::{Bench, Clock, Device};
+
+/// How far a client's baud rate may be off for a device to understand it.
+const BAUD_TOLERANCE: f64 = 0.03;
+
+/// Bytes for the host, and when they are due.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Outgoing {
+    /// Host time, since the line was opened.
+    pub(crate) due: Duration,
+    pub(crate) bytes: Vec<u8>,
+}
+
+/// The half-duplex line between host and devices: knows how long bytes take, and moves the bench's time.
+///
+/// Bytes and times are arguments; it reads no clock and touches no terminal.
+pub(crate) struct Line {
+    bench: Bench,
+    /// Bench time at which the line was opened.
+    opened: Duration,
+    deadline: Duration,
+    faults: WireFaults,
+    rng: ChaCha8Rng,
+    parser: Parser,
+    dispatcher: Dispatcher,
+    counters: Counters,
+    /// Bench time until which the line is taken.
+    free: Duration,
+}
+
+impl Line {
+    pub(crate) fn new(bench: Bench, settings: &WireSettings) -> Self {
+        Self {
+            opened: bench.now(),
+            free: bench.now(),
+            bench,
+            deadline: settings.deadline,
+            faults: settings.faults.clone(),
+            rng: ChaCha8Rng::seed_from_u64(settings.seed),
+            parser: Parser::default(),
+            dispatcher: Dispatcher::default(),
+            counters: Counters::default(),
+        }
+    }
+
+    /// The bench, its time being now.
+    pub(crate) fn bench(&mut self, host: Duration) -> &mut Bench {
+        if self.bench.clock() == Clock::Real {
+            self.advance_to(self.opened + host);
+        }
+        &mut self.bench
+    }
+
+    pub(crate) fn faults(&mut self) -> &mut WireFaults {
+        &mut self.faults
+    }
+
+    pub(crate) fn counters(&self) -> Counters {
+        Counters {
+            damaged: self.parser.damaged(),
+            ..self.counters
+        }
+    }
+
+    /// Takes bytes that the host sent at `baud`, and gives what it will hear.
+    pub(crate) fn receive(&mut self, bytes: &[u8], baud: u32, host: Duration) -> Vec<Outgoing> {
+        let begin = match self.bench.clock() {
+            Clock::Real => (self.opened + host).max(self.free),
+            Clock::Wire => self.bench.now().max(self.free),
+        };
+        let end = begin + wire_time(bytes.len(), baud);
+        self.free = end;
+        self.counters.bytes_in += bytes.len() as u64;
+        let mut outgoing = Vec::new();
+        if self.faults.echo {
+            outgoing.push(Outgoing {
+                due: self.due(end, Duration::ZERO, host),
+                bytes: bytes.to_vec(),
+            });
+        }
+        self.parser.push(bytes);
+        while let Some(received) = self.parser.take() {
+            let arrival = end.saturating_sub(wire_time(received.bytes_after, baud));
+            self.advance_to(arrival);
+            self.answer(&received.packet, baud, host, &mut outgoing);
+        }
+        if self.bench.clock() == Clock::Wire {
+            self.advance_to(self.free);
+        }
+        outgoing
+    }
+
+    fn answer(&mut self, packet: &Packet, baud: u32, host: Duration, outgoing: &mut Vec<Outgoing>) {
+        let now = self.bench.now();
+        let mut heard = Vec::new();
+        for device in self.bench.devices() {
+            if device.listens() && hears(device, baud) && !self.faults.silences(device.id(), now) {
+                heard.push(device);
+            }
+        }
+        self.counters.note(packet, heard.is_empty());
+        let slots = self.dispatcher.dispatch(packet, &mut heard);
+        let lost = self.bench.take_lost_acknowledgement();
+        let mut time = self.free.max(now);
+        if let Some(delay) = self.bench.take_delay() {
+            time += delay;
+        }
+        let mut unanswered = false;
+        for slot in slots {
+            let (delay, bytes) = match slot {
+                Slot::Status { delay, bytes, .. } => (delay, bytes),
+                Slot::Silence { bytes } => {
+                    time += wire_time(bytes, baud);
+                    unanswered = true;
+                    continue;
+                }
+            };
+            time += delay + wire_time(bytes.len(), baud);
+            match self.faults.deliver(&bytes, &mut self.rng).filter(|_| !lost) {
+                None => {
+                    self.counters.dropped += 1;
+                    unanswered = true;
+                }
+                Some(delivery) => {
+                    self.counters.replies += 1;
+                    self.counters.hurt += u64::from(delivery.hurt);
+                    unanswered |= delivery.hurt;
+                    outgoing.push(Outgoing {
+                        due: self.due(time, delivery.late, host),
+                        bytes: delivery.bytes,
+                    });
+                }
+            }
+        }
+        if unanswered && self.bench.clock() == Clock::Wire {
+            time += self.deadline;
+        }
+        self.free = time;
+    }
+
+    /// Host time at which what leaves the line at `time` reaches the host. In wire time that is at once, but for what
+    /// is late: the host's own patience is in host time.
+    fn due(&self, time: Duration, late: Duration, host: Duration) -> Duration {
+        match self.bench.clock() {
+            Clock::Real => time.saturating_sub(self.opened) + late,
+            Clock::Wire => host + late,
+        }
+    }
+
+    fn advance_to(&mut self, time: Duration) {
+        if time > self.bench.now() {
+            self.bench.advance_to(time);
+        }
+    }
+}
+
+/// Ten bits a byte.
+fn wire_time(bytes: usize, baud: u32) -> Duration {
+    Duration::from_secs_f64(bytes as f64 * 10.0 / f64::from(baud.max(1)))
+}
+
+fn hears(device: &dyn Device, baud: u32) -> bool {
+    (f64::from(baud) / f64::from(device.baud()) - 1.0).abs() <= BAUD_TOLERANCE
+}

@@ -1,0 +1,24 @@
+//! The wire: the device side of Dynamixel Protocol 2.0, from bytes to devices and back.
+//!
+//! Pure up to [`line`]: bytes and times are arguments. [`server`] gives it a pseudo-terminal and a thread.
+
+mod answer;
+mod counters;
+mod crc;
+mod dispatch;
+mod fast;
+mod faults;
+mod instruction;
+mod line;
+mod link;
+mod packet;
+mod parser;
+mod server;
+mod settings;
+mod stuffing;
+mod terminal;
+
+pub use counters::Counters;
+pub use faults::WireFaults;
+pub use server::Server;
+pub use settings::WireSettings;
