@@ -16,7 +16,7 @@ mod rig;
 
 pub use actuator::{Actuator, Identity, Location};
 pub use axis::{ACCELERATION_UNIT_RAD_S2, Axis, COUNTS_PER_TURN, VELOCITY_UNIT_RAD_S};
-pub use calibration::{Calibration, Filling};
+pub use calibration::{Calibration, Dark, Filling, MIN_COSINE, Unusable};
 pub use detector::{Counts, Detector, DetectorStatus, Exposure, Gain, Phase};
 pub use drive::{Drive, DriveError};
 pub use dynamixel::{Adapter, Dynamixel, Usb, ports};
