@@ -10,6 +10,7 @@ mod device;
 mod error;
 mod fault;
 mod imperfections;
+pub mod in_process;
 mod lamp;
 mod optics;
 mod photodiodes;

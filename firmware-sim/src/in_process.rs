@@ -1,0 +1,221 @@
+//! The simulated bench as a [`rig::Rig`] over tokio time, without a wire.
+//!
+//! Its clock is the bench's: [`Rig::wait`] lets exactly the time pass that was asked for, while tokio's timers round
+//! up to 1 ms. Time that passes elsewhere (a pause of the caller, a busy host) reaches the bench with the next
+//! request. Under `tokio::time::pause` a whole capture takes milliseconds and is the same for the same seed.
+
+mod axis;
+mod error;
+mod photometer;
+#[cfg(test)]
+mod tests;
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use arms::{Arm, Pose};
+use rig::dynamixel::register::{Register, servo};
+use rig::{Detector, Device, Rig, RigFile, Snapshot};
+use tokio::time::Instant;
+
+pub use axis::InProcessAxis;
+pub use error::InProcessError;
+pub use photometer::InProcessPhotometer;
+
+use crate::{Bench, Fault, Refusal, SimError};
+
+/// By how much tokio's clock may run ahead of the bench: its timers round up to whole milliseconds of its own, and one
+/// is fired up to a millisecond after that.
+const TIMER_GRAIN: Duration = Duration::from_millis(2);
+
+/// The simulated rig; must be made and used within a tokio runtime with time.
+#[derive(Debug)]
+pub struct InProcessRig {
+    bench: SharedBench,
+    axes: [InProcessAxis; 2],
+    photometer: InProcessPhotometer,
+}
+
+impl InProcessRig {
+    /// The rig that a rig file and its `[sim]` table describe, with power coming on now.
+    ///
+    /// # Errors
+    /// As [`Bench::new`].
+    pub fn new(file: &RigFile) -> Result<Self, SimError> {
+        Ok(Self::over(Bench::new(file)?, file))
+    }
+
+    /// The rig over a bench made from the same rig file.
+    pub fn over(bench: Bench, file: &RigFile) -> Self {
+        let bench = SharedBench {
+            switched_on: Instant::now() - bench.now(),
+            bench: Arc::new(Mutex::new(bench)),
+        };
+        let axis = |arm| InProcessAxis::new(bench.clone(), file, arm);
+        Self {
+            axes: Arm::BOTH.map(axis),
+            photometer: InProcessPhotometer::new(bench.clone(), file),
+            bench,
+        }
+    }
+
+    /// The bench behind it, to be looked at and tampered with from elsewhere.
+    pub fn bench(&self) -> SharedBench {
+        self.bench.clone()
+    }
+}
+
+impl Rig for InProcessRig {
+    type Error = InProcessError;
+    type Axis = InProcessAxis;
+    type Photometer = InProcessPhotometer;
+
+    fn axis(&mut self, arm: Arm) -> &mut InProcessAxis {
+        &mut self.axes[arm as usize]
+    }
+
+    fn photometer(&mut self) -> &mut InProcessPhotometer {
+        &mut self.photometer
+    }
+
+    async fn start(&mut self, goals: Pose) -> Result<(), InProcessError> {
+        for arm in Arm::BOTH {
+            let goal = self.axes[arm as usize].counts(goals.angle(arm));
+            // As with a sync write nobody says whether it was taken.
+            let _unacknowledged = self.bench.write(arm.into(), servo::GOAL_POSITION, goal);
+        }
+        Ok(())
+    }
+
+    async fn snapshot(&mut self) -> Result<Snapshot, InProcessError> {
+        Ok(Snapshot {
+            arms: [self.axes[0].look()?, self.axes[1].look()?],
+            detector: self.photometer.status().await?,
+        })
+    }
+
+    async fn wait(&mut self, duration: Duration) -> Result<(), InProcessError> {
+        let until = self.bench.lock().now() + duration;
+        tokio::time::sleep_until(self.bench.switched_on + until).await;
+        self.bench.lock().advance_to(until);
+        Ok(())
+    }
+}
+
+/// A handle to the bench behind an in-process rig.
+#[derive(Clone, Debug)]
+pub struct SharedBench {
+    bench: Arc<Mutex<Bench>>,
+    switched_on: Instant,
+}
+
+impl SharedBench {
+    /// Simulated time since power-on.
+    pub fn now(&self) -> Duration {
+        self.lock().now()
+    }
+
+    /// Where the arms really are, behind lag and backlash.
+    pub fn pose(&self) -> Pose {
+        self.lock().pose()
+    }
+
+    /// Has something go wrong at a given time.
+    pub fn schedule(&self, fault: Fault) {
+        self.lock().schedule(fault);
+    }
+
+    /// Restarts a device, as switching its power off and on does.
+    pub fn reboot(&self, device: Device) {
+        self.lock().device(device).reboot();
+    }
+
+    /// Reads a register past the bus, as a debugger would: the device does not notice.
+    ///
+    /// # Errors
+    /// The table has no such address.
+    pub fn peek(&self, device: Device, register: Register) -> Result<i64, Refusal> {
+        let bytes = self.lock().device(device).read(register.address, register.size)?;
+        Ok(decode(&bytes))
+    }
+
+    /// Writes a register past the bus, as another program would: the device does not notice.
+    ///
+    /// # Errors
+    /// The device refuses it.
+    pub fn poke(&self, device: Device, register: Register, value: i64) -> Result<(), Refusal> {
+        let bytes = &value.to_le_bytes()[..usize::from(register.size)];
+        self.lock().device(device).write(register.address, bytes)
+    }
+
+    /// The bench at the present moment.
+    fn lock(&self) -> MutexGuard<'_, Bench> {
+        let mut bench = self.bench.lock().unwrap_or_else(PoisonError::into_inner);
+        let elapsed = self.switched_on.elapsed();
+        if elapsed > bench.now() + TIMER_GRAIN {
+            bench.advance_to(elapsed);
+        }
+        bench
+    }
+
+    fn read(&self, device: Device, register: Register) -> Result<i64, InProcessError> {
+        let mut bench = self.lock();
+        let asked = bench.device(device);
+        let what = register.name;
+        if !asked.listens() {
+            return Err(InProcessError::NoReply { device, what });
+        }
+        asked.heard();
+        match asked.read(register.address, register.size) {
+            Ok(bytes) => Ok(decode(&bytes)),
+            Err(refusal) => Err(InProcessError::Refused {
+                device,
+                what,
+                refusal,
+            }),
+        }
+    }
+
+    fn write(&self, device: Device, register: Register, value: i64) -> Result<(), InProcessError> {
+        let bytes = &value.to_le_bytes()[..usize::from(register.size)];
+        self.write_bytes(device, register, bytes)
+    }
+
+    /// Writes a stretch that begins with a register.
+    fn write_bytes(&self, device: Device, first: Register, bytes: &[u8]) -> Result<(), InProcessError> {
+        let mut bench = self.lock();
+        let asked = bench.device(device);
+        let what = first.name;
+        if !asked.listens() {
+            return Err(InProcessError::NoReply { device, what });
+        }
+        asked.heard();
+        asked
+            .write(first.address, bytes)
+            .map_err(|refusal| InProcessError::Refused {
+                device,
+                what,
+                refusal,
+            })?;
+        match device == Device::Photometer && bench.take_lost_acknowledgement() {
+            true => Err(InProcessError::NoReply { device, what }),
+            false => Ok(()),
+        }
+    }
+}
+
+/// A register's value: 4 bytes are signed, fewer are not.
+fn decode(bytes: &[u8]) -> i64 {
+    match bytes.try_into() {
+        Ok(four) => i64::from(i32::from_le_bytes(four)),
+        Err(_) => bytes
+            .iter()
+            .rev()
+            .fold(0, |value, &byte| value << 8 | i64::from(byte)),
+    }
+}
+
+/// Units of a Bus Watchdog register.
+fn watchdog_units(watchdog: Duration) -> i64 {
+    (watchdog.as_millis() / 20) as i64
+}

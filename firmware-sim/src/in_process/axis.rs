@@ -1,0 +1,198 @@
+use arms::{Arm, ArmAngle, Profile};
+use rig::dynamixel::register::{MODELS, Register, common, servo};
+use rig::{Actuator, ArmSettings, Device, Estop, Identity, Location, MotionSettings, RigFile};
+
+use super::{InProcessError, SharedBench};
+
+/// Value of Bus Watchdog once it has tripped.
+const TRIPPED: i64 = 0xFF;
+/// Operating Mode: position within one turn.
+const POSITION: i64 = 3;
+
+/// One servo of the simulated rig.
+#[derive(Debug)]
+pub struct InProcessAxis {
+    bench: SharedBench,
+    device: Device,
+    arm: ArmSettings,
+    motion: MotionSettings,
+    /// Counts between which the arm may be.
+    range: [f64; 2],
+}
+
+impl InProcessAxis {
+    pub(super) fn new(bench: SharedBench, file: &RigFile, arm: Arm) -> Self {
+        let settings = file.arm(arm).clone();
+        let limits = file.envelope.limits(arm);
+        let ends = [limits.min, limits.max].map(|angle| settings.axis.counts(angle));
+        Self {
+            bench,
+            device: arm.into(),
+            arm: settings,
+            motion: file.motion.clone(),
+            range: [ends[0].min(ends[1]), ends[0].max(ends[1])],
+        }
+    }
+
+    pub(super) fn counts(&self, angle: ArmAngle) -> i64 {
+        self.arm.axis.counts(angle).round() as i64
+    }
+
+    fn read(&self, register: Register) -> Result<i64, InProcessError> {
+        self.bench.read(self.device, register)
+    }
+
+    fn write(&self, register: Register, value: i64) -> Result<(), InProcessError> {
+        self.bench.write(self.device, register, value)
+    }
+
+    pub(super) fn look(&self) -> Result<Location, InProcessError> {
+        let angle = |counts: i64| self.arm.axis.angle(counts as f64);
+        Ok(Location {
+            goal: angle(self.read(servo::GOAL_POSITION)?),
+            measured: angle(self.read(servo::PRESENT_POSITION)?),
+            in_position: self.read(servo::MOVING_STATUS)? & 1 == 1,
+            moving: self.read(servo::MOVING)? == 1,
+            torque: self.read(servo::TORQUE_ENABLE)? == 1,
+            hardware_error: self.hardware_error()?,
+        })
+    }
+
+    fn hardware_error(&self) -> Result<u8, InProcessError> {
+        self.read(common::HARDWARE_ERROR_STATUS).map(|bits| bits as u8)
+    }
+
+    /// Each way in which the servo is not what the rig file says.
+    fn differences(&self) -> Result<Vec<String>, InProcessError> {
+        let [velocity, _] = self.arm.axis.profile_registers(self.arm.profile);
+        let exactly = [
+            (servo::OPERATING_MODE, POSITION),
+            (servo::DRIVE_MODE, 0),
+            (servo::HOMING_OFFSET, 0),
+            (
+                common::RETURN_DELAY_TIME,
+                self.arm.return_delay.as_micros() as i64 / 2,
+            ),
+        ];
+        let at_most = [(servo::MIN_POSITION_LIMIT, self.range[0].ceil() as i64)];
+        let at_least = [
+            (servo::MAX_POSITION_LIMIT, self.range[1].floor() as i64),
+            (servo::VELOCITY_LIMIT, i64::from(velocity)),
+        ];
+        let mut differences = Vec::new();
+        let rules = exactly
+            .map(|(register, wanted)| (register, wanted..=wanted))
+            .into_iter()
+            .chain(at_most.map(|(register, wanted)| (register, i64::MIN..=wanted)))
+            .chain(at_least.map(|(register, wanted)| (register, wanted..=i64::MAX)));
+        for (register, wanted) in rules {
+            let found = self.read(register)?;
+            if !wanted.contains(&found) {
+                let (name, bound) = (register.name, limit(&wanted));
+                differences.push(format!(
+                    "{name} is {found}, must be {bound}: write it to address {}",
+                    register.address
+                ));
+            }
+        }
+        Ok(differences)
+    }
+}
+
+fn limit(range: &std::ops::RangeInclusive<i64>) -> String {
+    match (*range.start(), *range.end()) {
+        (i64::MIN, max) => format!("at most {max}"),
+        (min, i64::MAX) => format!("at least {min}"),
+        (exactly, _) => exactly.to_string(),
+    }
+}
+
+impl Actuator for InProcessAxis {
+    type Error = InProcessError;
+
+    async fn identify(&mut self) -> Result<Identity, InProcessError> {
+        let device = self.device;
+        let number = self.read(common::MODEL_NUMBER)?;
+        let model = MODELS.iter().find(|model| i64::from(model.1) == number);
+        let name = model.map_or_else(|| format!("model number {number}"), |model| model.0.to_owned());
+        let mut differences = self.differences()?;
+        if name != self.arm.model {
+            differences.insert(0, format!("it is a {name}, must be a {}", self.arm.model));
+        }
+        if !differences.is_empty() {
+            return Err(InProcessError::Mismatch { device, differences });
+        }
+        match self.hardware_error()? {
+            0 => Ok(Identity {
+                id: self.arm.id,
+                model: name,
+                firmware: self.read(common::FIRMWARE_VERSION)? as u8,
+            }),
+            bits => Err(InProcessError::Hardware { device, bits }),
+        }
+    }
+
+    async fn engage(&mut self, profile: Profile) -> Result<(), InProcessError> {
+        let [velocity, acceleration] = self.arm.axis.profile_registers(profile);
+        self.write(common::BUS_WATCHDOG, 0)?;
+        self.write(servo::PROFILE_ACCELERATION, i64::from(acceleration))?;
+        self.write(servo::PROFILE_VELOCITY, i64::from(velocity))?;
+        if self.read(servo::TORQUE_ENABLE)? == 1 {
+            self.write(servo::GOAL_POSITION, self.read(servo::PRESENT_POSITION)?)?;
+        }
+        self.write(servo::TORQUE_ENABLE, 1)?;
+        if self.read(servo::TORQUE_ENABLE)? == 0 {
+            return Err(InProcessError::Hardware {
+                device: self.device,
+                bits: self.hardware_error()?,
+            });
+        }
+        self.write(common::BUS_WATCHDOG, super::watchdog_units(self.motion.watchdog))
+    }
+
+    async fn location(&mut self) -> Result<Location, InProcessError> {
+        self.look()
+    }
+
+    async fn stop(&mut self) -> Result<(), InProcessError> {
+        if self.read(common::BUS_WATCHDOG)? == TRIPPED {
+            // It stands already, and takes no goal.
+            return Ok(());
+        }
+        let (present, velocity) = (
+            self.read(servo::PRESENT_POSITION)?,
+            self.read(servo::PRESENT_VELOCITY)?,
+        );
+        let acceleration = self.read(servo::PROFILE_ACCELERATION)?;
+        let [v, a] = [
+            velocity as f64 * rig::VELOCITY_UNIT_RAD_S,
+            acceleration as f64 * rig::ACCELERATION_UNIT_RAD_S2,
+        ];
+        let way = match acceleration {
+            0 => 0.0,
+            _ => v * v.abs() / (2.0 * a) * rig::COUNTS_PER_TURN / std::f64::consts::TAU,
+        };
+        let goal = (present as f64 + way).clamp(self.range[0].ceil(), self.range[1].floor());
+        self.write(servo::GOAL_POSITION, goal.round() as i64)
+    }
+
+    async fn halt(&mut self) -> Result<(), InProcessError> {
+        if self.motion.estop == Estop::Limp {
+            return self.write(servo::TORQUE_ENABLE, 0);
+        }
+        self.write(servo::PROFILE_ACCELERATION, 0)?;
+        self.write(servo::PROFILE_VELOCITY, 0)?;
+        if self.read(common::BUS_WATCHDOG)? == TRIPPED {
+            return Ok(());
+        }
+        self.write(servo::GOAL_POSITION, self.read(servo::PRESENT_POSITION)?)
+    }
+
+    async fn disengage(&mut self) -> Result<(), InProcessError> {
+        self.write(common::BUS_WATCHDOG, 0)?;
+        match self.motion.estop {
+            Estop::Limp => self.write(servo::TORQUE_ENABLE, 0),
+            Estop::Hold => Ok(()),
+        }
+    }
+}
