@@ -88,6 +88,10 @@ impl Trajectory {
 
     /// Position and velocity `t_s` seconds after the start; the goal and 0 from the end on.
     pub fn at(&self, t_s: f64) -> (f64, f64) {
+        // Asked first, since the subtractions below round.
+        if t_s >= self.duration_s() {
+            return (self.goal, 0.0);
+        }
         let mut t = t_s.max(0.0);
         for &(p, v, a, duration) in &self.phases {
             if t < duration {

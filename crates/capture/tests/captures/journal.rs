@@ -76,9 +76,9 @@ fn records() -> Vec<Record> {
 }
 
 fn write(path: &Path) -> Vec<Record> {
-    let mut journal = FileJournal::create(path, header()).unwrap();
+    let mut journal = FileJournal::create(path, header()).expect("a new file");
     for record in records() {
-        journal.append(&record).unwrap();
+        journal.append(&record).expect("room on the disk");
     }
     journal.records().to_vec()
 }
