@@ -106,3 +106,90 @@ impl Run<'_> {
             .sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use arms::{ArmAngle, Envelope, Limits, Profile};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn mechanics(approach: i8) -> Mechanics {
+        let limits = Limits {
+            min: ArmAngle::from_deg(-88.0),
+            max: ArmAngle::from_deg(88.0),
+        };
+        let profile = Profile {
+            velocity_rad_s: 1.0,
+            acceleration_rad_s2: 3.5,
+        };
+        Mechanics {
+            envelope: Envelope {
+                light: limits,
+                sensor: limits,
+                separation_rad: 0.1,
+                can_pass: false,
+            },
+            profiles: [profile; 2],
+            resolution_rad: [TAU / 4096.0; 2],
+            grid_rad: [0.0; 2],
+            approach,
+            overshoot_rad: 0.02,
+            settle_s: 0.0,
+            integration_us: [100, 1000],
+            transaction_s: 0.0,
+            warm_up_s: 0.0,
+            start: None,
+        }
+    }
+
+    fn poses() -> impl Strategy<Value = Pose> {
+        (-80.0..-5.0_f64, 5.0..80.0_f64).prop_map(|(light, sensor)| Pose::from_deg(light, sensor))
+    }
+
+    fn seconds(mechanics: &Mechanics, start: Standing, sweeps: &[Vec<Pose>], order: &[(usize, bool)]) -> f64 {
+        let mut at = start;
+        let mut total = 0.0;
+        for &(sweep, backwards) in order {
+            let mut poses = sweeps[sweep].clone();
+            if backwards {
+                poses.reverse();
+            }
+            for pose in poses {
+                total += way_s(mechanics, at, pose);
+                at = Standing {
+                    pose,
+                    approached: true,
+                };
+            }
+        }
+        total
+    }
+
+    fn all_orders() -> Vec<Vec<(usize, bool)>> {
+        let sequences = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+        let directions = |bits: usize| move |i: usize| bits >> i & 1 == 1;
+        sequences
+            .into_iter()
+            .flat_map(|sequence| (0..8).map(move |bits| sequence.map(|i| (i, directions(bits)(i))).to_vec()))
+            .collect()
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn prop_no_other_order_takes_less_time(
+            start in poses(),
+            sweeps in prop::collection::vec(prop::collection::vec(poses(), 1..4), 3),
+            approach in -1_i8..=1,
+        ) {
+            let mechanics = mechanics(approach);
+            let start = Standing { pose: start, approached: false };
+            let found = seconds(&mechanics, start, &sweeps, &order(&mechanics, Some(start), &sweeps));
+            let best = all_orders().iter().map(|order| seconds(&mechanics, start, &sweeps, order)).fold(f64::INFINITY, f64::min);
+            prop_assert!((found - best).abs() < 1e-9, "{found} s, possible are {best} s");
+        }
+    }
+}

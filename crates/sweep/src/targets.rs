@@ -4,7 +4,7 @@ use std::ops::Range;
 use arms::{Arm, ArmAngle, Pose};
 
 use crate::reach::{Hindrance, Reach};
-use crate::{Arc, Job, LeftOut, Mechanics, Plane, Sweep, SweepError};
+use crate::{Arc, Job, LeftOut, Sweep, SweepError};
 
 /// The poses of one sweep, in the order of its angle, and what it leaves out.
 #[derive(Clone, Debug)]
@@ -40,6 +40,15 @@ impl Stretches {
         free.map(|(range, _)| &self.poses[range.clone()])
     }
 
+    /// What hinders most of the poses, in words.
+    fn why_not(&self, reach: Reach<'_>) -> String {
+        let most = self.stretches.iter().max_by_key(|(range, _)| range.len());
+        most.and_then(|(_, hindrance)| hindrance.as_ref()).map_or_else(
+            || "no pose has that deviation".to_owned(),
+            |hindrance| reach.why(hindrance),
+        )
+    }
+
     /// The hindered stretches in words; their readings went to the rest of the sweep.
     fn left_out(&self, reach: Reach<'_>, sweep: &str, arm: Arm) -> Vec<LeftOut> {
         let describe = |(range, hindrance): &(Range<usize>, Option<Hindrance>)| {
@@ -65,20 +74,30 @@ pub(crate) fn plane(job: &Job, index: usize, reach: Reach<'_>) -> Result<Targets
     let light = |angle| Pose { light: angle, sensor };
     let quarter = ArmAngle::from_rad(FRAC_PI_2);
     let stretches = Stretches::new(reach, mechanics.angles(Arm::Light, -quarter, quarter).map(light));
-    let mut left_out = stretches.left_out(reach, &name, Arm::Light);
     if stretches.reachable().next().is_none() {
-        let why: Vec<_> = left_out.iter().map(|left| left.why.as_str()).collect();
+        let theta_r_deg = plane.theta_r.to_degrees();
         return Err(SweepError::Unreachable {
             file: job.name.clone(),
             key: format!("plane[{index}].theta_r_deg"),
             why: format!(
-                "no reading can be taken at {:.1}°: {}",
-                sensor.deg(),
-                why.join("; ")
+                "nothing can be measured at {theta_r_deg:.1}°: {}",
+                stretches.why_not(reach)
             ),
         });
     }
-    let mut poses: Vec<Pose> = deviations(plane, sensor, &stretches, mechanics)
+    let mut left_out = stretches.left_out(reach, &name, Arm::Light);
+    let ranges = stretches
+        .reachable()
+        .map(|poses| poses[0].deviation()..=poses[poses.len() - 1].deviation());
+    let spread = pdv::spread(
+        plane.distribution,
+        sensor.rad(),
+        &ranges.collect::<Vec<_>>(),
+        plane.readings,
+        mechanics.resolution_rad[Arm::Light as usize],
+    );
+    let mut poses: Vec<Pose> = spread
+        .deviations
         .into_iter()
         .map(|d| light(mechanics.nearest(Arm::Light, ArmAngle::from_rad(at_deviation(d, sensor)))))
         .filter(|&pose| reach.check(pose).is_ok())
@@ -120,16 +139,19 @@ pub(crate) fn arc(job: &Job, arc: &Arc, reach: Reach<'_>) -> Result<Targets, Swe
         .angles(Arm::Sensor, ArmAngle::NORMAL, quarter)
         .filter(exists);
     let stretches = Stretches::new(reach, sensors.map(pose));
-    let mut left_out = stretches.left_out(reach, "arc", Arm::Sensor);
     let free: Vec<Pose> = stretches.reachable().flatten().copied().collect();
     if free.is_empty() {
-        let why: Vec<_> = left_out.iter().map(|left| left.why.as_str()).collect();
         return Err(SweepError::Unreachable {
             file: job.name.clone(),
             key: "arc.offset".to_owned(),
-            why: format!("no reading can be taken at {}: {}", arc.offset, why.join("; ")),
+            why: format!(
+                "nothing can be measured at {}: {}",
+                arc.offset,
+                stretches.why_not(reach)
+            ),
         });
     }
+    let mut left_out = stretches.left_out(reach, "arc", Arm::Sensor);
     let spacing = (free.len() - 1) as f64 / (arc.readings.max(2) - 1) as f64;
     let mut poses: Vec<Pose> = (0..arc.readings)
         .map(|i| free[((i as f64 * spacing).round() as usize).min(free.len() - 1)])
@@ -171,14 +193,4 @@ fn pin(poses: &mut [Pose], to: Pose, arm: Arm) {
     {
         *nearest = to;
     }
-}
-
-/// The signed deviations of a plane, ascending.
-fn deviations(plane: &Plane, sensor: ArmAngle, stretches: &Stretches, mechanics: &Mechanics) -> Vec<f64> {
-    let _ = (sensor, mechanics);
-    let all: Vec<f64> = stretches.reachable().flatten().map(Pose::deviation).collect();
-    let spacing = (all.len() - 1) as f64 / (plane.readings.max(2) - 1) as f64;
-    (0..plane.readings)
-        .map(|i| all[(i as f64 * spacing).round() as usize])
-        .collect()
 }

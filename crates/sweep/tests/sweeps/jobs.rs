@@ -1,0 +1,104 @@
+use sweep::{Distribution, Job, Model};
+
+use crate::QUICKSTART;
+
+#[test]
+fn quickstart_is_read() {
+    let job = Job::parse(QUICKSTART, "quickstart.toml").unwrap();
+    assert_eq!(job.name, "quickstart.toml");
+    assert_eq!(job.planes.len(), 1);
+    assert!((job.planes[0].theta_r.to_degrees() - 70.0).abs() < 1e-12);
+    assert_eq!(
+        (job.planes[0].readings, job.planes[0].distribution),
+        (90, Distribution::Capped)
+    );
+    assert_eq!(job.arc.map(|arc| (arc.readings, arc.offset)), Some((90, 0.0)));
+    assert_eq!(job.model, Model::Separable);
+}
+
+#[test]
+fn what_is_not_said_is_capped_separable_and_without_arc() {
+    let job = Job::parse("[[plane]]\ntheta_r_deg = 45\nreadings = 5", "").unwrap();
+    assert_eq!(job.planes[0].distribution, Distribution::Capped);
+    assert_eq!((job.arc, job.model), (None, Model::Separable));
+}
+
+/// What is wrong with a job file, and what is said about it.
+#[test]
+fn bad_input_is_named_with_line_key_and_range() {
+    let plane = "[[plane]]\ntheta_r_deg = 70.0\nreadings = 90\n";
+    let table = [
+        ("".to_owned(), "job.toml: [[plane]]: 0 planes, allowed are 1 … 12"),
+        (
+            plane.repeat(13),
+            "job.toml: [[plane]]: 13 planes, allowed are 1 … 12",
+        ),
+        (
+            "[[plane]]\ntheta_r_deg = 85.1\nreadings = 90".to_owned(),
+            "job.toml, line 2: plane[0].theta_r_deg: 85.1 is not within 0 … 85",
+        ),
+        (
+            format!("{plane}[[plane]]\nreadings = 1\ntheta_r_deg = -1"),
+            "job.toml, line 6: plane[1].theta_r_deg: -1 is not within 0 … 85",
+        ),
+        (
+            "[[plane]]\ntheta_r_deg = nan\nreadings = 90".to_owned(),
+            "job.toml, line 2: plane[0].theta_r_deg: NaN is not within 0 … 85",
+        ),
+        (
+            "[[plane]]\ntheta_r_deg = 70\nreadings = 0".to_owned(),
+            "job.toml, line 3: plane[0].readings: 0 is not within 1 … 2000",
+        ),
+        (
+            format!("{plane}[arc]\nreadings = 2001"),
+            "job.toml, line 5: arc.readings: 2001 is not within 1 … 2000",
+        ),
+        (
+            format!("{plane}[arc]\nreadings = 2\noffset = 1.5"),
+            "job.toml, line 6: arc.offset: 1.5 is not within -1 … 1",
+        ),
+        (
+            format!("{plane}speed = 3"),
+            "job.toml, line 4: speed: unknown field `speed`, expected one of `theta_r_deg`, `readings`, `distribution`",
+        ),
+        (
+            format!("{plane}distribution = \"dense\""),
+            "job.toml, line 4: distribution: unknown variant `dense`, expected one of `capped`, `paper`, `uniform`",
+        ),
+        (
+            "[[plane]]\ntheta_r_deg = \"70\"\nreadings = 90".to_owned(),
+            "job.toml, line 2: theta_r_deg: invalid type: string \"70\", expected f64",
+        ),
+        (
+            "[[plane]]\ntheta_r_deg = 70\nreadings = 9.5".to_owned(),
+            "job.toml, line 3: readings: invalid type: floating point `9.5`, expected i64",
+        ),
+        (
+            "[[plane]]\ntheta_r_deg = 70".to_owned(),
+            "job.toml, line 1: [[plane]]: missing field `readings`",
+        ),
+        (
+            format!("{plane}[reconstruction]\nmodel = \"magic\""),
+            "job.toml, line 5: model: unknown variant `magic`, expected `separable`",
+        ),
+    ];
+    for (text, expected) in table {
+        let error = Job::parse(&text, "job.toml").unwrap_err();
+        assert_eq!(error.to_string(), expected, "of\n{text}");
+    }
+}
+
+#[test]
+fn what_is_no_toml_is_refused_with_its_line() {
+    for text in [
+        "[[plane]]\ntheta_r_deg = = 3",
+        "\u{0}",
+        "[[plane",
+        "a = 1\na = 2",
+        "ä = \"",
+        "\n\n]",
+    ] {
+        let error = Job::parse(text, "job.toml").unwrap_err().to_string();
+        assert!(error.starts_with("job.toml, line "), "{text:?}: {error}");
+    }
+}

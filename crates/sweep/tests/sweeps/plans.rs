@@ -1,0 +1,351 @@
+use arms::{Arm, ArmAngle, Pose};
+use sweep::{Mechanics, Step, Sweep, SweepError, plan, way};
+
+use crate::{QUICKSTART, job, mechanics, poses, steps};
+
+#[test]
+fn quickstart_takes_every_reading_it_asks_for() {
+    let plan = plan(&job(QUICKSTART), &mechanics()).unwrap();
+    assert_eq!(poses(&plan, Sweep::Plane(0)).len(), 90);
+    assert_eq!(poses(&plan, Sweep::Arc).len(), 90);
+    let left_out: Vec<String> = plan
+        .left_out
+        .iter()
+        .map(|left| format!("{}: {} ({})", left.what, left.why, left.readings))
+        .collect();
+    let expected = [
+        "plane 70.0°, light -90.0° … -88.1°: the light arm may be at -88.0° … 88.0° (0)",
+        "plane 70.0°, light 65.0° … 74.9°: arms closer than 5.0° shadow each other (0)",
+        "plane 70.0°, light 75.0° … 88.0°: the arms cannot pass each other (0)",
+        "plane 70.0°, light 88.1° … 90.0°: the light arm may be at -88.0° … 88.0° (0)",
+        "arc, sensor 0.0° … 2.5°: arms closer than 5.0° shadow each other (0)",
+        "arc, sensor 88.1° … 90.0°: the light arm may be at -88.0° … 88.0° (0)",
+    ];
+    assert_eq!(left_out, expected);
+}
+
+#[test]
+fn dark_readings_come_first_where_the_arms_stand() {
+    let plan = plan(&job(QUICKSTART), &mechanics()).unwrap();
+    let dark: Vec<&Step> = steps(&plan, Sweep::Dark).collect();
+    assert!(
+        dark.iter().enumerate().all(|(i, step)| step.index == i),
+        "they come first"
+    );
+    for gain in 0..3 {
+        for integration_us in [100, 100_000] {
+            let repeats = dark
+                .iter()
+                .filter(|step| step.exposure == Some((gain, integration_us)))
+                .count();
+            assert_eq!(repeats, 4, "gain step {gain}, {integration_us} µs");
+        }
+    }
+    let resolution = mechanics().resolution_rad[0];
+    for step in dark {
+        let moved = [
+            step.pose().light.rad() + 45.0_f64.to_radians(),
+            step.pose().sensor.rad() - 45.0_f64.to_radians(),
+        ];
+        assert!(
+            moved.iter().all(|rad| rad.abs() <= resolution / 2.0),
+            "dark readings need no motion"
+        );
+        assert!(!step.lamp);
+    }
+    assert!(
+        plan.steps
+            .iter()
+            .all(|step| step.lamp == (step.sweep != Sweep::Dark))
+    );
+}
+
+#[test]
+fn a_plane_covers_both_sides_of_the_mirror_direction_and_holds_the_sensor() {
+    let plan = plan(&job(QUICKSTART), &mechanics()).unwrap();
+    let poses = poses(&plan, Sweep::Plane(0));
+    let sensor = poses[0].sensor;
+    assert!((sensor.deg() - 70.0).abs() <= 0.044, "{}", sensor.deg());
+    assert!(poses.iter().all(|pose| pose.sensor == sensor));
+    let (outwards, inwards) = poses
+        .iter()
+        .fold((0, 0), |(outwards, inwards), pose| match pose.deviation() {
+            d if d < 0.0 => (outwards + 1, inwards),
+            d if d > 0.0 => (outwards, inwards + 1),
+            _ => (outwards, inwards),
+        });
+    assert!(
+        outwards > 10 && inwards > 30,
+        "{outwards} outwards, {inwards} inwards"
+    );
+    let light =
+        |choose: fn(f64, f64) -> f64| poses.iter().map(|pose| pose.light.deg()).reduce(choose).unwrap();
+    assert!((light(f64::min) + 88.0).abs() < 0.1 && (light(f64::max) - 65.0).abs() < 0.1);
+}
+
+#[test]
+fn the_arc_keeps_its_offset_and_meets_each_plane_in_one_pose() {
+    // At 70° nothing lies 0.25 further out.
+    for (offset, met) in [("0.0", [1, 1]), ("0.3", [1, 1]), ("-0.25", [0, 1])] {
+        let text = format!(
+            "[[plane]]\ntheta_r_deg = 70\nreadings = 40\n[[plane]]\ntheta_r_deg = 40\nreadings = 40\n\
+             [arc]\nreadings = 50\noffset = {offset}"
+        );
+        let plan = plan(&job(&text), &mechanics()).unwrap();
+        let arc = poses(&plan, Sweep::Arc);
+        let offset: f64 = offset.parse().unwrap();
+        for pose in &arc {
+            // Half a count of the light.
+            let half = pose.light.rad().cos() * mechanics().resolution_rad[0] / 2.0 + 1e-6;
+            assert!(
+                (pose.deviation() - offset).abs() <= half,
+                "{pose:?} deviates by {}",
+                pose.deviation()
+            );
+        }
+        let shared = [0, 1].map(|plane| {
+            let plane = poses(&plan, Sweep::Plane(plane));
+            arc.iter().filter(|pose| plane.contains(pose)).count()
+        });
+        assert_eq!(shared, met, "offset {offset}");
+    }
+}
+
+#[test]
+fn the_mirror_arc_reaches_from_half_the_separation_to_the_limits() {
+    let plan = plan(&job(QUICKSTART), &mechanics()).unwrap();
+    let mut sensor: Vec<f64> = poses(&plan, Sweep::Arc)
+        .iter()
+        .map(|pose| pose.sensor.deg())
+        .collect();
+    sensor.sort_by(f64::total_cmp);
+    assert!(
+        (sensor[0] - 2.5).abs() < 0.1 && (sensor[89] - 88.0).abs() < 0.1,
+        "{sensor:?}"
+    );
+    assert!(
+        poses(&plan, Sweep::Arc)
+            .iter()
+            .all(|pose| pose.light.rad() == -pose.sensor.rad())
+    );
+}
+
+/// Near retro-reflection a rig whose arms pass each other has only a gap.
+#[test]
+fn arms_that_pass_each_other_measure_beyond_the_gap() {
+    let mut mechanics = mechanics();
+    mechanics.envelope.can_pass = true;
+    let plan = plan(
+        &job("[[plane]]\ntheta_r_deg = 45\nreadings = 200\ndistribution = \"uniform\""),
+        &mechanics,
+    );
+    let poses = poses(&plan.unwrap(), Sweep::Plane(0));
+    let beyond = poses.iter().filter(|pose| pose.light > pose.sensor).count();
+    assert!(beyond > 10, "{beyond} beyond the sensor");
+    assert!(poses.iter().all(|&pose| !mechanics.envelope.occluded(pose)));
+}
+
+/// At θ_r = 0 the mirror direction is behind the sensor.
+#[test]
+fn a_sensor_at_the_normal_sees_one_side() {
+    let plan = plan(&job("[[plane]]\ntheta_r_deg = 0\nreadings = 30"), &mechanics()).unwrap();
+    let poses = poses(&plan, Sweep::Plane(0));
+    assert_eq!(poses.len(), 30);
+    assert!(
+        poses
+            .iter()
+            .all(|pose| (-88.0..=-5.0).contains(&pose.light.deg()))
+    );
+}
+
+#[test]
+fn the_papers_distribution_merges_what_falls_on_one_count() {
+    let text = "[[plane]]\ntheta_r_deg = 70\nreadings = 90\ndistribution = \"paper\"";
+    let plan = plan(&job(text), &mechanics()).unwrap();
+    let left = plan
+        .left_out
+        .iter()
+        .find(|left| left.readings > 0)
+        .expect("some were merged");
+    assert_eq!(poses(&plan, Sweep::Plane(0)).len() + left.readings, 90);
+    assert_eq!(left.what, format!("plane 70.0°, {} values of d_p", left.readings));
+}
+
+#[test]
+fn what_this_rig_cannot_do_is_refused_with_the_key() {
+    let small = |mut mechanics: Mechanics| {
+        mechanics.envelope.sensor.max = ArmAngle::from_deg(60.0);
+        mechanics
+    };
+    let error = plan(&job(QUICKSTART), &small(mechanics())).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "job.toml: plane[0].theta_r_deg: nothing can be measured at 70.0°: the sensor arm may be at -88.0° … 60.0°"
+    );
+    // The arms stand the wrong way round for the mirror direction.
+    let swapped = Mechanics {
+        start: Some(Pose::from_deg(45.0, -45.0)),
+        ..mechanics()
+    };
+    let text = "[[plane]]\ntheta_r_deg = 0\nreadings = 9\n[arc]\nreadings = 9";
+    let error = plan(&job(text), &swapped).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "job.toml: arc.offset: nothing can be measured at 0: the arms cannot pass each other"
+    );
+    let outside = Mechanics {
+        start: Some(Pose::from_deg(-91.0, 45.0)),
+        ..mechanics()
+    };
+    let error = plan(&job(QUICKSTART), &outside).unwrap_err();
+    assert!(matches!(error, SweepError::Start { .. }), "{error}");
+    let touching = Mechanics {
+        start: Some(Pose::from_deg(44.0, 45.0)),
+        ..mechanics()
+    };
+    let error = plan(&job(QUICKSTART), &touching).unwrap_err();
+    assert!(matches!(error, SweepError::Start { .. }), "{error}");
+}
+
+/// A servo at its limit hardly ever reads exactly that.
+#[test]
+fn an_arm_that_stands_a_hair_beyond_its_limit_may_start() {
+    let start = Some(Pose::from_deg(-88.05, 88.05));
+    let plan = plan(&job(QUICKSTART), &Mechanics { start, ..mechanics() }).unwrap();
+    assert!(mechanics().envelope.check_pose(plan.steps[0].pose()).is_ok());
+}
+
+#[test]
+fn sweeps_are_taken_in_the_order_with_the_least_travel() {
+    let text = "[[plane]]\ntheta_r_deg = 80\nreadings = 20\n[[plane]]\ntheta_r_deg = 10\nreadings = 20\n\
+                [[plane]]\ntheta_r_deg = 45\nreadings = 20\n[arc]\nreadings = 20";
+    let job = job(text);
+    let order = |start| {
+        let plan = plan(
+            &job,
+            &Mechanics {
+                start: Some(start),
+                ..mechanics()
+            },
+        )
+        .unwrap();
+        let mut sweeps: Vec<Sweep> = plan.steps.iter().map(|step| step.sweep).collect();
+        sweeps.dedup();
+        (sweeps, plan.seconds())
+    };
+    let (low, _) = order(Pose::from_deg(0.0, 10.0));
+    assert_eq!(low[1], Sweep::Plane(1), "begins with the plane at hand: {low:?}");
+    let (high, _) = order(Pose::from_deg(70.0, 80.0));
+    assert_eq!(
+        high[1],
+        Sweep::Plane(0),
+        "begins with the plane at hand: {high:?}"
+    );
+}
+
+#[test]
+fn the_sensor_makes_room_before_the_light_follows() {
+    let way = way(
+        &mechanics(),
+        Pose::from_deg(15.0, 20.0),
+        Pose::from_deg(64.0, 70.0),
+    )
+    .unwrap();
+    assert_eq!(way.len(), 2);
+    assert!((way[0].light.deg() - 15.0).abs() < 0.05 && (way[0].sensor.deg() - 70.0).abs() < 0.05);
+}
+
+#[test]
+fn no_way_leads_past_the_other_arm() {
+    let error = way(
+        &mechanics(),
+        Pose::from_deg(-20.0, 20.0),
+        Pose::from_deg(40.0, 20.0),
+    )
+    .unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "no safe way leads from light -20.00°, sensor 20.00° to light 40.00°, sensor 20.00°"
+    );
+}
+
+/// Every motion ends in the direction of approach, also the first one of an arm.
+#[test]
+fn every_approach_is_from_the_side_that_is_asked_for() {
+    for approach in [1, -1] {
+        let mechanics = Mechanics {
+            approach,
+            ..mechanics()
+        };
+        let plan = plan(&job(QUICKSTART), &mechanics).unwrap();
+        let mut from = plan.steps[0].pose();
+        let mut came = [0.0; 2];
+        for step in &plan.steps {
+            for &to in &step.path {
+                for arm in Arm::BOTH {
+                    let way = to.angle(arm) - from.angle(arm);
+                    if way.abs() > 1e-9 {
+                        came[arm as usize] = way.signum();
+                    }
+                }
+                from = to;
+            }
+            if step.sweep != Sweep::Dark {
+                assert_eq!(
+                    came,
+                    [f64::from(approach); 2],
+                    "step {}: {:?}",
+                    step.index,
+                    step.path
+                );
+            }
+        }
+    }
+}
+
+/// What a step is said to take is what its parts take.
+#[test]
+fn seconds_are_those_of_profiles_settling_and_integration() {
+    let mechanics = mechanics();
+    let plan = plan(&job(QUICKSTART), &mechanics).unwrap();
+    let mut from = plan.steps[0].pose();
+    for step in &plan.steps {
+        let mut motion = 0.0;
+        for &to in &step.path {
+            let legs = Arm::BOTH
+                .map(|arm| mechanics.profiles[arm as usize].duration_s(to.angle(arm) - from.angle(arm)));
+            motion += legs[0].max(legs[1]);
+            from = to;
+        }
+        let rest = step.seconds - motion - mechanics.settle_s - mechanics.transaction_s;
+        match step.exposure {
+            Some((_, us)) => assert!((rest - f64::from(us) * 1e-6).abs() < 1e-9, "step {}", step.index),
+            None => assert!(
+                rest > 0.006 && rest < 0.1,
+                "step {}: {rest} s of integration",
+                step.index
+            ),
+        }
+    }
+    let sum: f64 = plan.steps.iter().map(|step| step.seconds).sum();
+    assert!((plan.seconds() - sum - mechanics.warm_up_s).abs() < 1e-9);
+}
+
+#[test]
+fn without_a_known_start_the_first_way_is_not_timed() {
+    let unknown = plan(
+        &job(QUICKSTART),
+        &Mechanics {
+            start: None,
+            ..mechanics()
+        },
+    )
+    .unwrap();
+    let first = steps(&unknown, Sweep::Dark).next().unwrap().pose();
+    let next = unknown.steps.iter().find(|step| step.lamp).unwrap();
+    assert_eq!(
+        next.path,
+        [first],
+        "dark readings are taken where the first sweep begins"
+    );
+}
