@@ -8,10 +8,11 @@ use brdf::{Brdf, Error, Fitted, MerlTable, Spherical};
 use glam::DVec3;
 use proptest::prelude::*;
 
-static TABLE: LazyLock<MerlTable> = LazyLock::new(|| MerlTable::fill(&Fitted::named("gold-paint").unwrap()));
+static TABLE: LazyLock<MerlTable> =
+    LazyLock::new(|| MerlTable::fill(&Fitted::named("gold-paint").expect("known to hold")));
 static BYTES: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let mut bytes = Vec::new();
-    TABLE.write_to(&mut bytes).unwrap();
+    TABLE.write_to(&mut bytes).expect("known to hold");
     bytes
 });
 
@@ -21,7 +22,7 @@ fn offset(channel: usize, [i, j, k]: [usize; 3]) -> usize {
 
 fn stored(channel: usize, index: [usize; 3]) -> f64 {
     let at = offset(channel, index);
-    f64::from_le_bytes(BYTES[at..at + 8].try_into().unwrap())
+    f64::from_le_bytes(BYTES[at..at + 8].try_into().expect("known to hold"))
 }
 
 /// The written bytes with another number in one place.
@@ -33,7 +34,9 @@ fn altered(channel: usize, index: [usize; 3], value: f64) -> Vec<u8> {
 }
 
 fn message(bytes: &[u8]) -> String {
-    MerlTable::read_from(bytes).unwrap_err().to_string()
+    MerlTable::read_from(bytes)
+        .expect_err("must be refused")
+        .to_string()
 }
 
 #[test]

@@ -4,10 +4,26 @@
 //! Source: Tongbuasirilai, Unger, Kurt, "Efficient BRDF Sampling Using Projected Deviation Vector
 //! Parameterization". The crate knows nothing of arms, rigs or files.
 
+mod albedo;
+mod compare;
 mod coordinates;
 mod density;
+mod error;
+mod factor;
+mod model;
+mod observation;
+mod quantile;
+mod separable;
+mod sides;
 mod spread;
 
+pub use albedo::albedo;
+pub use compare::{Channels, Comparison, Draw, Metrics, compare};
 pub use coordinates::{Pdv, light_angle};
 pub use density::{Density, mean_reflectance};
+pub use error::Error;
+pub use factor::Factor;
+pub use model::{FactorTable, Model};
+pub use observation::Observation;
+pub use separable::Separable;
 pub use spread::{Distribution, Spread, spread};

@@ -1,0 +1,110 @@
+//! Cost of the separable model in units of what it cannot do without, and of filling a table.
+
+use std::hint::black_box;
+use std::time::Duration;
+
+use brdf::{Brdf, Fitted, MerlTable, Spherical};
+use criterion::{BenchmarkGroup, Criterion, measurement::WallTime};
+use glam::DVec3;
+use pdv::{Distribution, Separable, spread};
+
+fn model() -> Separable {
+    let theta_r = 70.0_f64.to_radians();
+    let range = theta_r.sin() - 85.0_f64.to_radians().sin()..=theta_r.sin() + 65.0_f64.to_radians().sin();
+    let deviations = spread(Distribution::Capped, theta_r, &[range], 90, 1.5e-3).deviations;
+    let arc: Vec<f64> = (0..90)
+        .map(|n| (f64::from(n) * 85.0 / 89.0).to_radians())
+        .collect();
+    let gold = Fitted::named("gold-paint").expect("a fitted material");
+    Separable::sample(&gold, theta_r, &deviations, &arc, 0.0).expect("poses exist")
+}
+
+/// Pairs of directions, evenly in angle by a golden-ratio sequence.
+fn pairs() -> Vec<(DVec3, DVec3)> {
+    let fraction = |n: u32, ratio: f64| (f64::from(n) * ratio).fract();
+    (0..1024)
+        .map(|n| {
+            let theta = fraction(n, 0.819_172_5) * 80.0_f64.to_radians();
+            let phi = fraction(n, 0.671_043_6) * std::f64::consts::TAU;
+            let exitant = fraction(n, 0.549_700_5) * 80.0_f64.to_radians();
+            (
+                Spherical { theta, phi }.direction(),
+                Spherical {
+                    theta: exitant,
+                    phi: 0.0,
+                }
+                .direction(),
+            )
+        })
+        .collect()
+}
+
+/// Runs a benchmark and gives the least of its seconds per iteration, the figure that other load disturbs least.
+fn seconds(group: &mut BenchmarkGroup<'_, WallTime>, name: &str, mut run: impl FnMut()) -> f64 {
+    let mut least = f64::INFINITY;
+    group.bench_function(name, |bencher| {
+        bencher.iter_custom(|iterations| {
+            let start = std::time::Instant::now();
+            for _ in 0..iterations {
+                run();
+            }
+            let taken = start.elapsed();
+            least = least.min(taken.as_secs_f64() / iterations as f64);
+            taken
+        });
+    });
+    least
+}
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args();
+    let model = model();
+    let pairs = pairs();
+    let logs: Vec<DVec3> = pairs
+        .iter()
+        .map(|&(incident, exitant)| model.eval(incident, exitant).map(f64::ln_1p))
+        .collect();
+
+    let mut group = criterion.benchmark_group("evaluation");
+    let exponentials = seconds(&mut group, "three exp_m1, 1024 times", || {
+        for log in &logs {
+            let log = black_box(*log);
+            black_box(DVec3::new(log.x.exp_m1(), log.y.exp_m1(), log.z.exp_m1()));
+        }
+    });
+    let evaluation = seconds(&mut group, "separable model, 1024 pairs", || {
+        for pair in &pairs {
+            let (incident, exitant) = black_box(*pair);
+            black_box(model.eval(incident, exitant));
+        }
+    });
+    group.finish();
+
+    let mut group = criterion.benchmark_group("table");
+    group.sample_size(10).measurement_time(Duration::from_secs(8));
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut fill = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads can be had");
+        seconds(&mut group, &format!("fill with {threads} threads"), || {
+            black_box(pool.install(|| MerlTable::fill(&model)));
+        })
+    };
+    let (one, all) = (fill(1), fill(threads));
+    group.finish();
+    criterion.final_summary();
+
+    if evaluation.is_finite() && exponentials.is_finite() {
+        let (ns, ratio) = (evaluation / 1024.0 * 1e9, evaluation / exponentials);
+        println!("one evaluation takes {ns:.1} ns, {ratio:.2} times three exp_m1 (at most 3)");
+    }
+    if one.is_finite() && all.is_finite() {
+        let efficiency = one / all / threads as f64;
+        println!(
+            "filling a table with {threads} threads has an efficiency of {:.0} % (at least 80)",
+            efficiency * 100.0
+        );
+    }
+}

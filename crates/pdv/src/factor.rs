@@ -1,0 +1,246 @@
+use glam::DVec3;
+
+use crate::Error;
+
+/// Most cells of the index; more would not stay in the nearest cache.
+const CELLS_MAX: usize = 4096;
+
+/// An RGB function of one variable, known at sorted nodes.
+///
+/// Between nodes a cubic with the slopes of Fritsch and Butland (1984): monotone where the values are, so it never
+/// leaves their range. Beyond the nodes it is constant, and [`Factor::extrapolated`] says so.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Factor {
+    nodes: Vec<f64>,
+    values: Vec<DVec3>,
+    /// Coefficients of 1, t, t², t³ with t = x − node, for every interval.
+    cubics: Vec<[DVec3; 4]>,
+    /// For every cell of an even grid over the range, the interval in which the cell begins.
+    cells: Vec<u16>,
+    cells_per_unit: f64,
+    dropped: usize,
+}
+
+impl Factor {
+    /// A factor through points (x, RGB) in any order; values at the same x are averaged, points with a number that
+    /// is not finite are dropped and counted. `name` stands in the error.
+    ///
+    /// # Errors
+    /// No point is left.
+    pub fn new(name: &'static str, points: impl IntoIterator<Item = (f64, DVec3)>) -> Result<Self, Error> {
+        let mut all = 0;
+        let mut points: Vec<(f64, DVec3)> = points
+            .into_iter()
+            .inspect(|_| all += 1)
+            .filter(|(x, value)| x.is_finite() && value.is_finite())
+            .collect();
+        let dropped = all - points.len();
+        if points.is_empty() {
+            return Err(Error::Empty {
+                factor: name,
+                dropped,
+            });
+        }
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (nodes, values): (Vec<f64>, Vec<DVec3>) = points
+            .chunk_by(|a, b| a.0 == b.0)
+            .map(|same| {
+                (
+                    same[0].0,
+                    same.iter().map(|point| point.1).sum::<DVec3>() / same.len() as f64,
+                )
+            })
+            .unzip();
+        let cubics = cubics(&nodes, &values);
+        let (cells, cells_per_unit) = cells(&nodes);
+        Ok(Self {
+            nodes,
+            values,
+            cubics,
+            cells,
+            cells_per_unit,
+            dropped,
+        })
+    }
+
+    /// The value at x; held constant beyond the nodes. A NaN counts as the first node.
+    #[inline]
+    pub fn at(&self, x: f64) -> DVec3 {
+        let first = self.nodes[0];
+        let x = x.max(first).min(self.nodes[self.nodes.len() - 1]);
+        let cell = ((x - first) * self.cells_per_unit) as usize;
+        let mut interval = usize::from(self.cells[cell.min(self.cells.len() - 1)]);
+        while interval + 2 < self.nodes.len() && self.nodes[interval + 1] <= x {
+            interval += 1;
+        }
+        let t = x - self.nodes[interval];
+        let [c0, c1, c2, c3] = self.cubics[interval];
+        c0 + (c1 + (c2 + c3 * t) * t) * t
+    }
+
+    /// First and last node: the measured range.
+    pub fn range(&self) -> (f64, f64) {
+        (self.nodes[0], self.nodes[self.nodes.len() - 1])
+    }
+
+    /// Whether x lies beyond the measured range.
+    pub fn extrapolated(&self, x: f64) -> bool {
+        !(self.nodes[0]..=self.nodes[self.nodes.len() - 1]).contains(&x)
+    }
+
+    /// Nodes with their values, ascending.
+    pub fn points(&self) -> impl ExactSizeIterator<Item = (f64, DVec3)> {
+        self.nodes.iter().copied().zip(self.values.iter().copied())
+    }
+
+    /// Points that were not finite.
+    pub fn dropped(&self) -> usize {
+        self.dropped
+    }
+
+    /// The same nodes with other values.
+    pub(crate) fn map(self, change: impl Fn(DVec3) -> DVec3) -> Self {
+        let values: Vec<DVec3> = self.values.into_iter().map(change).collect();
+        Self {
+            cubics: cubics(&self.nodes, &values),
+            values,
+            ..self
+        }
+    }
+}
+
+/// Cubic Hermite coefficients of every interval; one constant piece where there is a single node.
+fn cubics(nodes: &[f64], values: &[DVec3]) -> Vec<[DVec3; 4]> {
+    if nodes.len() == 1 {
+        return vec![[values[0], DVec3::ZERO, DVec3::ZERO, DVec3::ZERO]];
+    }
+    let widths: Vec<f64> = nodes.windows(2).map(|x| x[1] - x[0]).collect();
+    let secants: Vec<DVec3> = values
+        .windows(2)
+        .zip(&widths)
+        .map(|(v, h)| (v[1] - v[0]) / h)
+        .collect();
+    let last = nodes.len() - 1;
+    // Flat at the first node: G is even about the mirror direction, and F goes on to θ_r = 0 with zero slope.
+    let mut slopes = vec![DVec3::ZERO; nodes.len()];
+    slopes[last] = secants[last - 1];
+    for n in 1..last {
+        slopes[n] = slope([widths[n - 1], widths[n]], [secants[n - 1], secants[n]]);
+    }
+    (0..widths.len())
+        .map(|n| {
+            let (h, secant) = (widths[n], secants[n]);
+            let bend = (secant * 3.0 - slopes[n] * 2.0 - slopes[n + 1]) / h;
+            let twist = (slopes[n] + slopes[n + 1] - secant * 2.0) / (h * h);
+            [values[n], slopes[n], bend, twist]
+        })
+        .collect()
+}
+
+/// Weighted harmonic mean of the neighbouring secants, 0 at a turn.
+fn slope([before, after]: [f64; 2], [left, right]: [DVec3; 2]) -> DVec3 {
+    let (first, second) = (2.0 * after + before, after + 2.0 * before);
+    let channel = |l: f64, r: f64| {
+        if l * r > 0.0 {
+            (first + second) / (first / l + second / r)
+        } else {
+            0.0
+        }
+    };
+    DVec3::new(
+        channel(left.x, right.x),
+        channel(left.y, right.y),
+        channel(left.z, right.z),
+    )
+}
+
+/// An even grid over the nodes, fine enough that a cell seldom holds more than one of them.
+fn cells(nodes: &[f64]) -> (Vec<u16>, f64) {
+    let length = nodes[nodes.len() - 1] - nodes[0];
+    let narrowest = nodes.windows(2).map(|x| x[1] - x[0]).fold(length, f64::min);
+    if length <= 0.0 {
+        return (vec![0], 0.0);
+    }
+    let count = ((length / narrowest).min(CELLS_MAX as f64) as usize).max(1);
+    let cells_per_unit = count as f64 / length;
+    let intervals = nodes.len() - 1;
+    let cells = (0..count)
+        .map(|cell| {
+            let begin = nodes[0] + cell as f64 / cells_per_unit;
+            // A little less, for rounding may put the end of the cell before into this one.
+            let begin = begin - 1e-9 * length;
+            let interval = nodes.partition_point(|&node| node <= begin).saturating_sub(1);
+            interval.min(intervals - 1).min(usize::from(u16::MAX)) as u16
+        })
+        .collect();
+    (cells, cells_per_unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn factor(points: &[(f64, f64)]) -> Factor {
+        Factor::new("G", points.iter().map(|&(x, y)| (x, DVec3::new(y, 2.0 * y, 0.0)))).unwrap()
+    }
+
+    #[test]
+    fn takes_points_in_any_order_and_averages_those_at_one_place() {
+        let f = factor(&[
+            (1.0, 3.0),
+            (0.0, 1.0),
+            (1.0, 5.0),
+            (f64::NAN, 1.0),
+            (2.0, f64::INFINITY),
+        ]);
+        assert_eq!(
+            f.points().map(|(x, y)| (x, y.x)).collect::<Vec<_>>(),
+            [(0.0, 1.0), (1.0, 4.0)]
+        );
+        assert_eq!(f.dropped(), 2);
+        assert_eq!(f.range(), (0.0, 1.0));
+    }
+
+    #[test]
+    fn is_constant_beyond_its_range_and_says_so() {
+        let f = factor(&[(0.5, 3.0), (1.0, 1.0)]);
+        assert_eq!((f.at(0.0).x, f.at(7.0).x, f.at(f64::INFINITY).x), (3.0, 1.0, 1.0));
+        assert!(f.extrapolated(0.4999) && f.extrapolated(1.0001) && f.extrapolated(f64::NAN));
+        assert!(!f.extrapolated(0.5) && !f.extrapolated(1.0));
+        assert_eq!(factor(&[(0.3, 2.0)]).at(9.0), DVec3::new(2.0, 4.0, 0.0));
+    }
+
+    #[test]
+    fn without_a_point_there_is_no_factor() {
+        let error = Factor::new("F", [(f64::NAN, DVec3::ONE)]).unwrap_err();
+        assert_eq!(
+            error,
+            Error::Empty {
+                factor: "F",
+                dropped: 1
+            }
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn prop_meets_its_nodes_and_stays_between_them(
+            points in prop::collection::vec((0.0..2.0_f64, 0.0..9.0_f64), 2..200),
+            at in -0.1..2.1_f64,
+            crowd in 0..9,
+        ) {
+            // Some nodes crowd as the raw distribution's do.
+            let points: Vec<_> = points.iter().map(|&(x, y)| (x.powi(crowd), y)).collect();
+            let f = factor(&points);
+            for (x, value) in f.points() {
+                prop_assert!((f.at(x) - value).abs().max_element() < 1e-9, "at {}", x);
+            }
+            let known: Vec<_> = f.points().collect();
+            let after = known.partition_point(|&(x, _)| x <= at).clamp(1, known.len().max(2) - 1).min(known.len() - 1);
+            let (a, b) = (known[after.saturating_sub(1)].1.x, known[after].1.x);
+            let y = f.at(at).x;
+            prop_assert!(a.min(b) - 1e-9 <= y && y <= a.max(b) + 1e-9, "{} at {} not in {} … {}", y, at, a, b);
+        }
+    }
+}

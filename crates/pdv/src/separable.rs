@@ -1,0 +1,188 @@
+use brdf::Brdf;
+use glam::DVec3;
+
+use crate::sides::Sides;
+use crate::{Error, Factor, FactorTable, Model, Observation};
+
+/// G(x) below this, ln(1 + 1e-6 sr⁻¹), is black: no ratio can be made of it.
+const BLACK: f64 = 1e-6;
+/// ln(1 + ρ) is kept below this (ρ = 1e13 sr⁻¹), so that no product of factors overflows.
+const LOG_MAX: f64 = 30.0;
+/// Largest difference of θ_r within a plane, rad: what a servo may stand off its goal, and no other plane.
+const THETA_R_SPREAD: f64 = 0.02;
+/// Largest difference of d_p within an arc.
+const OFFSET_SPREAD: f64 = 0.05;
+
+/// The paper's separable model ln(1 + ρ) = F(θ_r)·G(d_p) (Eq. 3), with F = F_m(θ_r)/G(x).
+///
+/// G is what a plane at θ_r^dp measures and F_m what an arc measures that keeps d_p = x; both in ln(1 + ρ), per
+/// channel. Where G was measured on both sides of the mirror direction they are averaged, see
+/// [`Separable::from_observations`]. Beyond the measured ranges both factors are held constant, which
+/// [`Model::extrapolated`] tells. Not reciprocal, since F depends on ω_o alone.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Separable {
+    theta_r: f64,
+    intersection: f64,
+    /// Over sin θ_r, which needs no arc sine at evaluation.
+    f: Factor,
+    g: Factor,
+    dropped: usize,
+}
+
+impl Separable {
+    /// The model of one plane and one arc.
+    ///
+    /// - The readings of both sides of the plane become one G: at the mirror direction both have the same weight,
+    ///   outwards that of the outward side fades linearly to none at its end, from where on the side towards the
+    ///   normal stands alone.
+    /// - x is the mean deviation of the arc and G(x) is taken on its side, so that F(θ_r^dp) is 1 where nothing is
+    ///   wrong. Where G(x) is black (below 1e-6) in a channel, F is 1 in it.
+    /// - Without an arc F is 1 everywhere, and all but the plane's θ_r is extrapolated.
+    /// - Readings that are not finite are dropped and counted; negative ones count as 0.
+    ///
+    /// # Errors
+    /// No finite reading of the plane, none of an arc that is not empty, or θ_r of the plane or d_p of the arc that
+    /// differ by more than 0.02 rad or 0.05 and so belong to several sweeps.
+    pub fn from_observations(plane: &[Observation], arc: &[Observation]) -> Result<Self, Error> {
+        let sides = Sides::new(plane)?;
+        let g = sides.factor()?;
+        let theta_r = steady(
+            "θ_r of a plane, in rad,",
+            plane.iter().map(|o| o.theta_r),
+            THETA_R_SPREAD,
+        )?;
+        if arc.is_empty() {
+            let f = Factor::new("F", [(theta_r.sin(), DVec3::ONE)])?;
+            return Ok(Self {
+                theta_r,
+                intersection: 0.0,
+                f,
+                g,
+                dropped: sides.dropped(),
+            });
+        }
+        let intersection = steady("d_p of an arc", arc.iter().map(|o| o.deviation), OFFSET_SPREAD)?;
+        let measured = Factor::new("F", arc.iter().map(|o| (o.theta_r.sin(), o.log())))?;
+        let dropped = sides.dropped() + measured.dropped();
+        let at_x = sides.at(intersection);
+        let black = at_x.cmplt(DVec3::splat(BLACK));
+        let f = measured.map(|f| DVec3::select(black, DVec3::ONE, f / at_x.max(DVec3::splat(BLACK))));
+        Ok(Self {
+            theta_r,
+            intersection,
+            f,
+            g,
+            dropped,
+        })
+    }
+
+    /// The model of a BRDF as a perfect instrument would see it: a plane at `theta_r` (rad) read at signed
+    /// `deviations`, and an arc read at `arc` (θ_r in rad) at the deviation `intersection`. Poses that do not exist
+    /// are left out.
+    ///
+    /// # Errors
+    /// No pose exists.
+    pub fn sample(
+        brdf: &(impl Brdf + ?Sized),
+        theta_r: f64,
+        deviations: &[f64],
+        arc: &[f64],
+        intersection: f64,
+    ) -> Result<Self, Error> {
+        let plane: Vec<_> = deviations
+            .iter()
+            .filter_map(|&d| Observation::of(brdf, theta_r, d))
+            .collect();
+        let arc: Vec<_> = arc
+            .iter()
+            .filter_map(|&theta| Observation::of(brdf, theta, intersection))
+            .collect();
+        Self::from_observations(&plane, &arc)
+    }
+
+    /// θ_r^dp, where the plane was measured, rad.
+    pub fn theta_r(&self) -> f64 {
+        self.theta_r
+    }
+
+    /// x, the signed deviation at which the arc crosses the plane.
+    pub fn intersection(&self) -> f64 {
+        self.intersection
+    }
+
+    /// F over sin θ_r, normalised: 1 at θ_r^dp.
+    pub fn f(&self) -> &Factor {
+        &self.f
+    }
+
+    /// G over d_p, as ln(1 + ρ).
+    pub fn g(&self) -> &Factor {
+        &self.g
+    }
+
+    /// Readings that were not finite.
+    pub fn dropped(&self) -> usize {
+        self.dropped
+    }
+}
+
+impl Brdf for Separable {
+    #[inline]
+    fn eval(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
+        if !(incident.z > 0.0 && exitant.z > 0.0) {
+            return DVec3::ZERO;
+        }
+        let (sin_o, d_p) = sin_o_and_d_p(incident, exitant);
+        let log = (self.f.at(sin_o) * self.g.at(d_p)).min(DVec3::splat(LOG_MAX));
+        DVec3::new(log.x.exp_m1(), log.y.exp_m1(), log.z.exp_m1())
+    }
+}
+
+impl Model for Separable {
+    fn extrapolated(&self, incident: DVec3, exitant: DVec3) -> bool {
+        let (sin_o, d_p) = sin_o_and_d_p(incident, exitant);
+        self.f.extrapolated(sin_o) || self.g.extrapolated(d_p)
+    }
+
+    fn factors(&self) -> Vec<FactorTable> {
+        let f = self
+            .f
+            .points()
+            .map(|(sin, value)| (sin.asin().to_degrees(), value));
+        vec![
+            FactorTable {
+                name: "F",
+                variable: "theta_r_deg",
+                rows: f.collect(),
+            },
+            FactorTable {
+                name: "G",
+                variable: "d_p",
+                rows: self.g.points().collect(),
+            },
+        ]
+    }
+}
+
+/// sin θ_o and d_p = |L_p − R_p| with R_p = −V_p, from unit vectors without any angle.
+#[inline]
+fn sin_o_and_d_p(incident: DVec3, exitant: DVec3) -> (f64, f64) {
+    let (view, deviation) = (exitant.truncate(), incident.truncate() + exitant.truncate());
+    (view.length(), deviation.length())
+}
+
+/// Mean of what should stand still; non-finite values are left out.
+fn steady(what: &'static str, values: impl Iterator<Item = f64>, allowed: f64) -> Result<f64, Error> {
+    let values: Vec<f64> = values.filter(|value| value.is_finite()).collect();
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    if high - low > allowed {
+        return Err(Error::Mixed {
+            what,
+            low,
+            high,
+            allowed,
+        });
+    }
+    Ok(values.iter().sum::<f64>() / values.len().max(1) as f64)
+}
