@@ -19,8 +19,6 @@ pub(crate) enum Level {
 pub(crate) enum Slot {
     /// It answers.
     Status {
-        /// Who speaks, 254 for a joint answer.
-        id: u8,
         /// Its return delay.
         delay: Duration,
         /// What stands on the wire.
@@ -64,7 +62,7 @@ pub(crate) fn ask(
         });
     }
     match answer {
-        Some((delay, bytes)) => Slot::Status { id, delay, bytes },
+        Some((delay, bytes)) => Slot::Status { delay, bytes },
         None => Slot::Silence {
             bytes: STATUS_LENGTH + length,
         },

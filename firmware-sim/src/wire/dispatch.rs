@@ -115,3 +115,6 @@ fn ping_all(devices: &mut [&mut dyn Device]) -> Vec<Slot> {
     slots.push(Slot::Silence { bytes: 0 });
     slots
 }
+
+#[cfg(test)]
+mod tests;

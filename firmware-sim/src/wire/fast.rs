@@ -40,11 +40,7 @@ pub(crate) fn answer(devices: &mut [&mut dyn Device], reads: &[Read]) -> Vec<Slo
         return vec![Slot::Silence { bytes: whole }];
     };
     let missing = whole - bytes.len();
-    let mut slots = vec![Slot::Status {
-        id: BROADCAST,
-        delay,
-        bytes,
-    }];
+    let mut slots = vec![Slot::Status { delay, bytes }];
     if missing > 0 {
         slots.push(Slot::Silence { bytes: missing });
     }

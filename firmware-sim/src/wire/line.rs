@@ -118,7 +118,7 @@ impl Line {
         let mut unanswered = false;
         for slot in slots {
             let (delay, bytes) = match slot {
-                Slot::Status { delay, bytes, .. } => (delay, bytes),
+                Slot::Status { delay, bytes } => (delay, bytes),
                 Slot::Silence { bytes } => {
                     time += wire_time(bytes, baud);
                     unanswered = true;

@@ -11,6 +11,8 @@ mod faults;
 mod instruction;
 mod line;
 mod link;
+#[cfg(test)]
+mod memory;
 mod packet;
 mod parser;
 mod server;
