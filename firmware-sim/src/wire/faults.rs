@@ -39,8 +39,6 @@ pub(crate) struct Delivery {
     pub(crate) bytes: Vec<u8>,
     /// Extra wait before it.
     pub(crate) late: Duration,
-    /// Whether anything was done to it.
-    pub(crate) hurt: bool,
 }
 
 impl WireFaults {
@@ -84,8 +82,7 @@ impl WireFaults {
         } else {
             Duration::ZERO
         };
-        let hurt = bytes != reply || !late.is_zero();
-        Some(Delivery { bytes, late, hurt })
+        Some(Delivery { bytes, late })
     }
 }
 
@@ -95,4 +92,135 @@ fn rewrite(bytes: &mut [u8], change: impl FnOnce(&mut [u8])) {
     let end = bytes.len() - 2;
     let crc = super::crc::crc16(&bytes[..end]);
     bytes[end..].copy_from_slice(&crc.to_le_bytes());
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use rand::SeedableRng;
+
+    use super::*;
+    use crate::wire::packet::Packet;
+
+    const REPLIES: usize = 20_000;
+
+    fn reply() -> Vec<u8> {
+        Packet::status(1, 0, &[0, 8, 0, 0]).encode()
+    }
+
+    fn deliveries(faults: &WireFaults, seed: u64) -> Vec<Option<Delivery>> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        (0..REPLIES).map(|_| faults.deliver(&reply(), &mut rng)).collect()
+    }
+
+    /// Checks that a count is within five standard deviations of what a rate gives.
+    fn assert_rate(name: &str, found: usize, trials: usize, rate: f64) {
+        let mean = trials as f64 * rate;
+        let deviation = (mean * (1.0 - rate)).sqrt();
+        assert!(
+            (found as f64 - mean).abs() < 5.0 * deviation,
+            "{name}: {found} of {trials}, wanted {rate}"
+        );
+    }
+
+    #[test]
+    fn a_perfect_wire_changes_nothing() {
+        let clean = Some(Delivery {
+            bytes: reply(),
+            late: Duration::ZERO,
+        });
+        assert!(
+            deliveries(&WireFaults::default(), 1)
+                .into_iter()
+                .all(|delivery| delivery == clean)
+        );
+    }
+
+    #[test]
+    fn the_broken_bus_of_the_acceptance_test_has_its_rates() {
+        let faults = WireFaults {
+            corrupt_byte: 0.002,
+            drop_reply: 0.005,
+            ..WireFaults::default()
+        };
+        let deliveries = deliveries(&faults, 2);
+        let arrived: Vec<_> = deliveries.iter().flatten().collect();
+        assert_rate("dropped", REPLIES - arrived.len(), REPLIES, 0.005);
+        let wrong_bytes = |delivery: &&Delivery| {
+            delivery
+                .bytes
+                .iter()
+                .zip(reply())
+                .filter(|(a, b)| **a != *b)
+                .count()
+        };
+        let wrong = arrived.iter().map(wrong_bytes).sum();
+        assert_rate("wrong bytes", wrong, arrived.len() * reply().len(), 0.002);
+    }
+
+    #[test]
+    fn each_fault_does_what_it_says() {
+        let with = |change: fn(&mut WireFaults)| {
+            let mut faults = WireFaults::default();
+            change(&mut faults);
+            let mut rng = ChaCha8Rng::seed_from_u64(3);
+            faults.deliver(&reply(), &mut rng).unwrap()
+        };
+        let clean = reply();
+        let wrong_id = Packet::decode(&with(|faults| faults.wrong_id = 1.0).bytes).unwrap();
+        assert_eq!((wrong_id.id, wrong_id.params), (2, vec![0, 0, 8, 0, 0]));
+        let wrong_length = with(|faults| faults.wrong_length = 1.0).bytes;
+        assert!([[0, 0], [1, 0], [0xFF, 0xFF]].contains(&[wrong_length[5], wrong_length[6]]));
+        assert!(Packet::decode(&wrong_length).is_some(), "its CRC matches");
+        let cut = with(|faults| faults.truncate_reply = 1.0).bytes;
+        assert!(cut.len() < clean.len() && clean.starts_with(&cut));
+        assert_eq!(
+            with(|faults| faults.duplicate_reply = 1.0).bytes,
+            [clean.clone(), clean.clone()].concat()
+        );
+        let noisy = with(|faults| faults.noise = 1.0).bytes;
+        assert!(noisy.len() > clean.len() && noisy.ends_with(&clean));
+        let late = with(|faults| {
+            faults.late_reply = 1.0;
+            faults.late_by = Duration::from_millis(40);
+        });
+        assert_eq!(
+            late,
+            Delivery {
+                bytes: clean,
+                late: Duration::from_millis(40)
+            }
+        );
+    }
+
+    #[test]
+    fn one_id_falls_silent_from_its_time_on() {
+        let faults = WireFaults {
+            silent: [(2, Duration::from_secs(3))].into(),
+            ..WireFaults::default()
+        };
+        assert!(!faults.silences(2, Duration::from_millis(2999)));
+        assert!(faults.silences(2, Duration::from_secs(3)));
+        assert!(!faults.silences(1, Duration::from_secs(9)));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(16))]
+        #[test]
+        fn prop_a_seed_gives_the_same_faults_again(seed in any::<u64>()) {
+            let faults = WireFaults {
+                corrupt_byte: 0.01,
+                drop_reply: 0.1,
+                duplicate_reply: 0.1,
+                truncate_reply: 0.1,
+                noise: 0.1,
+                wrong_length: 0.1,
+                wrong_id: 0.1,
+                late_reply: 0.1,
+                late_by: Duration::from_millis(40),
+                ..WireFaults::default()
+            };
+            prop_assert!(deliveries(&faults, seed) == deliveries(&faults, seed));
+        }
+    }
 }

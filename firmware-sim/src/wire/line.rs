@@ -100,6 +100,7 @@ impl Line {
         outgoing
     }
 
+    /// Has a packet carried out at the bench's present time, and the answers sent.
     fn answer(&mut self, packet: &Packet, baud: u32, host: Duration, outgoing: &mut Vec<Outgoing>) {
         let now = self.bench.now();
         let mut heard = Vec::new();
@@ -111,41 +112,39 @@ impl Line {
         self.counters.note(packet, heard.is_empty());
         let slots = self.dispatcher.dispatch(packet, &mut heard);
         let lost = self.bench.take_lost_acknowledgement();
-        let mut time = self.free.max(now);
-        if let Some(delay) = self.bench.take_delay() {
-            time += delay;
-        }
-        let mut unanswered = false;
+        self.free = self.free.max(now) + self.bench.take_delay().unwrap_or_default();
+        let mut in_vain = false;
         for slot in slots {
-            let (delay, bytes) = match slot {
-                Slot::Status { delay, bytes } => (delay, bytes),
+            match slot {
                 Slot::Silence { bytes } => {
-                    time += wire_time(bytes, baud);
-                    unanswered = true;
-                    continue;
+                    self.free += wire_time(bytes, baud);
+                    in_vain = true;
                 }
-            };
-            time += delay + wire_time(bytes.len(), baud);
-            match self.faults.deliver(&bytes, &mut self.rng).filter(|_| !lost) {
-                None => {
-                    self.counters.dropped += 1;
-                    unanswered = true;
-                }
-                Some(delivery) => {
-                    self.counters.replies += 1;
-                    self.counters.hurt += u64::from(delivery.hurt);
-                    unanswered |= delivery.hurt;
-                    outgoing.push(Outgoing {
-                        due: self.due(time, delivery.late, host),
-                        bytes: delivery.bytes,
-                    });
+                Slot::Status { delay, bytes } => {
+                    self.free += delay + wire_time(bytes.len(), baud);
+                    let sent = self.send(&bytes, lost, host);
+                    in_vain |= sent.as_ref().is_none_or(|sent| sent.bytes != bytes);
+                    outgoing.extend(sent);
                 }
             }
         }
-        if unanswered && self.bench.clock() == Clock::Wire {
-            time += self.deadline;
+        if in_vain && self.bench.clock() == Clock::Wire {
+            self.free += self.deadline;
         }
-        self.free = time;
+    }
+
+    /// Sends one status packet, which leaves the line when that is free again; `None` where it is lost.
+    fn send(&mut self, bytes: &[u8], lost: bool, host: Duration) -> Option<Outgoing> {
+        let Some(delivery) = self.faults.deliver(bytes, &mut self.rng).filter(|_| !lost) else {
+            self.counters.dropped += 1;
+            return None;
+        };
+        self.counters.replies += 1;
+        self.counters.hurt += u64::from(delivery.bytes != bytes || !delivery.late.is_zero());
+        Some(Outgoing {
+            due: self.due(self.free, delivery.late, host),
+            bytes: delivery.bytes,
+        })
     }
 
     /// Host time at which what leaves the line at `time` reaches the host. In wire time that is at once, but for what
@@ -172,3 +171,6 @@ fn wire_time(bytes: usize, baud: u32) -> Duration {
 fn hears(device: &dyn Device, baud: u32) -> bool {
     (f64::from(baud) / f64::from(device.baud()) - 1.0).abs() <= BAUD_TOLERANCE
 }
+
+#[cfg(test)]
+mod tests;

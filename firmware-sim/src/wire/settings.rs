@@ -67,7 +67,7 @@ struct RawSilence {
 impl Default for RawWire {
     fn default() -> Self {
         Self {
-            deadline_ms: 10.0,
+            deadline_ms: 12.0,
             corrupt_byte: 0.0,
             drop_reply: 0.0,
             duplicate_reply: 0.0,
