@@ -91,3 +91,117 @@ fn disc(half_angle_rad: f64) -> Vec<[f64; 2]> {
         .chain(ring((1.0 + node) / 2.0, 0.5))
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use arms::Limits;
+    use brdf::Mirror;
+
+    fn envelope() -> Envelope {
+        let limits = Limits {
+            min: ArmAngle::from_deg(-88.0),
+            max: ArmAngle::from_deg(88.0),
+        };
+        Envelope {
+            light: limits,
+            sensor: limits,
+            separation_rad: 5f64.to_radians(),
+            can_pass: true,
+        }
+    }
+
+    fn optics(text: &str, filling: Filling, apertures_deg: [f64; 2]) -> Optics {
+        let specimen = brdf::specimen(text).unwrap();
+        Optics::new(specimen, envelope(), filling, apertures_deg.map(f64::to_radians))
+    }
+
+    #[test]
+    fn the_disc_has_the_moments_of_a_disc() {
+        let radius = 0.01_f64;
+        let points = disc(radius.atan());
+        let mean = |f: &dyn Fn(f64, f64) -> f64| {
+            points
+                .iter()
+                .map(|&[x, y]| f(x / radius, y / radius))
+                .sum::<f64>()
+                / points.len() as f64
+        };
+        let moments = [
+            mean(&|x, _| x),
+            mean(&|x, y| x * y),
+            mean(&|x, _| x * x) - 1.0 / 4.0,
+            mean(&|_, y| y.powi(4)) - 1.0 / 8.0,
+            mean(&|x, y| (x * y).powi(2)) - 1.0 / 24.0,
+            mean(&|x, _| x.powi(5)),
+        ];
+        for (i, moment) in moments.into_iter().enumerate() {
+            assert!(moment.abs() < 1e-12, "moment {i} is off by {moment}");
+        }
+    }
+
+    #[test]
+    fn the_cosine_is_that_of_the_declared_filling() {
+        let pose = Pose::from_deg(-60.0, 20.0);
+        let f = 0.5 / std::f64::consts::PI;
+        for (filling, cos) in [(Filling::Over, 0.5), (Filling::Under, 20f64.to_radians().cos())] {
+            for apertures in [[0.0, 0.0], [0.5, 1.0]] {
+                let signal = optics("lambert:0.5", filling, apertures).signal(pose);
+                assert!(
+                    (signal - DVec3::splat(f * cos)).length() < 1e-15,
+                    "{filling:?}: {signal}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn arms_that_are_too_close_shadow_each_other() {
+        let optics = optics("lambert:0.5", Filling::Over, [0.25, 0.25]);
+        assert_eq!(optics.signal(Pose::from_deg(30.0, 34.9)), DVec3::ZERO);
+        assert_ne!(optics.signal(Pose::from_deg(30.0, 35.1)), DVec3::ZERO);
+    }
+
+    #[test]
+    fn apertures_average_a_mirror() {
+        // Against the mean over many points of both discs; in units of the mirror's peak.
+        let [kappa, source, detector] = [0.5, 0.3, 0.4];
+        let averaged = optics("mirror:1", Filling::Under, [source, detector]);
+        let peak = Mirror::new(1.0, Mirror::HALF_ANGLE_RAD)
+            .unwrap()
+            .eval(DVec3::Z, DVec3::Z)
+            .x;
+        for off in [0.0, 0.2, 0.4, 0.6, 0.8, 1.0, 1.3] {
+            let reading = averaged.signal(Pose::from_deg(-30.0 - off, 30.0)).x / peak;
+            let share = mirror_share(off, kappa, source, detector);
+            assert!(
+                (reading - share).abs() < 0.06,
+                "{off}° off: {reading}, not {share}"
+            );
+        }
+    }
+
+    /// Share of the pairs of points of two discs whose directions differ by at most `kappa`, in a plane.
+    fn mirror_share(off: f64, kappa: f64, source: f64, detector: f64) -> f64 {
+        let points = |radius: f64| {
+            let n = 24;
+            let grid = (0..n * n).map(move |i| {
+                let at = |i: i32| radius * (f64::from(2 * i + 1) / f64::from(n) - 1.0);
+                [at(i % n), at(i / n)]
+            });
+            grid.filter(|[x, y]| x.hypot(*y) <= radius).collect::<Vec<_>>()
+        };
+        let (sources, detectors) = (points(source), points(detector));
+        let hits = sources
+            .iter()
+            .flat_map(|s| {
+                detectors
+                    .iter()
+                    .map(move |d| (off + s[0] - d[0]).hypot(s[1] - d[1]))
+            })
+            .filter(|&distance| distance <= kappa)
+            .count();
+        hits as f64 / (sources.len() * detectors.len()) as f64
+    }
+}

@@ -101,3 +101,117 @@ fn shot(counts: f64, electrons_per_count: f64, random: &mut ChaCha8Rng) -> f64 {
         Err(_) => counts,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rig::Filling;
+
+    use super::*;
+
+    fn photodiodes(imperfections: Imperfections) -> Photodiodes {
+        Photodiodes {
+            calibration: Calibration {
+                filling: Filling::Over,
+                responsivity: [1.0, 2.0, 0.5],
+                monitor: 5.0,
+            },
+            full_scale: 1_048_575,
+            imperfections,
+            seed: 7,
+        }
+    }
+
+    /// 100 ms of a signal under a nominal lamp.
+    fn light(signal: f64, gain: f64) -> Light {
+        Light {
+            signal: DVec3::splat(signal * 0.1),
+            lamp_s: 0.1,
+            duration_s: 0.1,
+            gain,
+            temperature_c: 25.0,
+        }
+    }
+
+    #[test]
+    fn without_imperfections_counts_are_the_rounded_truth() {
+        let photodiodes = photodiodes(Imperfections::NONE);
+        let exposed = photodiodes.expose(light(0.123_456, 16.0), 0);
+        assert_eq!(exposed.rgb, [197_530, 395_059, 98_765]);
+        assert_eq!((exposed.monitor, exposed.saturated), (500_000, false));
+        let full = photodiodes.expose(light(3.0, 16.0), 1);
+        assert_eq!(full.rgb[0], 1_048_575);
+        assert!(full.saturated);
+    }
+
+    #[test]
+    fn noise_depends_on_seed_and_number_alone() {
+        let photodiodes = photodiodes(Imperfections::DEFAULT);
+        let first = photodiodes.expose(light(0.1, 1.0), 3);
+        assert_eq!(first, photodiodes.expose(light(0.1, 1.0), 3));
+        assert_ne!(first, photodiodes.expose(light(0.1, 1.0), 4));
+        let other = Photodiodes {
+            seed: 8,
+            ..photodiodes
+        };
+        assert_ne!(first, other.expose(light(0.1, 1.0), 3));
+    }
+
+    #[test]
+    fn mean_and_spread_are_the_stated_ones() {
+        let amounts = Imperfections::DEFAULT;
+        let photodiodes = photodiodes(amounts);
+        for (signal, gain) in [(0.15, 16.0), (0.001, 256.0), (0.0, 256.0), (0.3, 1.0)] {
+            let n = 4000;
+            let reds: Vec<f64> = (0..n)
+                .map(|serial| f64::from(photodiodes.expose(light(signal, gain), serial).rgb[0]))
+                .collect();
+            let mean = reds.iter().sum::<f64>() / n as f64;
+            let variance = reds.iter().map(|red| (red - mean).powi(2)).sum::<f64>() / n as f64;
+            let at_gain_1 = (signal + amounts.stray_per_sr) * 1e5 + amounts.dark_counts_per_s * 0.1;
+            let shot = at_gain_1 * gain * gain / amounts.shot_noise_electrons;
+            // Rounding adds 1/12.
+            let expected = shot + amounts.read_noise_counts.powi(2) + 1.0 / 12.0;
+            let expected_mean = at_gain_1 * gain + amounts.dark_offset_counts;
+            let case = format!("f·cos {signal} at ×{gain}");
+            assert!(
+                (mean - expected_mean).abs() < 4.5 * (expected / n as f64).sqrt(),
+                "{case}: mean {mean}, not {expected_mean}"
+            );
+            assert!(
+                (variance / expected - 1.0).abs() < 0.1,
+                "{case}: variance {variance}, not {expected}"
+            );
+        }
+    }
+
+    #[test]
+    fn bright_readings_are_good_to_well_under_a_percent() {
+        let photodiodes = photodiodes(Imperfections::DEFAULT);
+        // A white specimen at 45°.
+        let truth = 0.16 * 16.0 * 1e5;
+        let worst = (0..1000)
+            .map(|serial| f64::from(photodiodes.expose(light(0.16, 16.0), serial).rgb[0]))
+            .map(|red| ((red - 64.0 - 32.0 - 16.0) / truth - 1.0).abs())
+            .fold(0.0, f64::max);
+        assert!(worst < 0.006, "worst of 1000 is off by {worst}");
+    }
+
+    #[test]
+    fn dark_counts_double_with_temperature() {
+        let photodiodes = photodiodes(Imperfections {
+            dark_counts_per_s: 1e4,
+            dark_doubling_c: 8.0,
+            ..Imperfections::NONE
+        });
+        let at = |temperature_c| {
+            let dark = Light {
+                signal: DVec3::ZERO,
+                lamp_s: 0.0,
+                temperature_c,
+                ..light(0.0, 1.0)
+            };
+            photodiodes.expose(dark, 0).rgb[0]
+        };
+        assert_eq!((at(25.0), at(33.0), at(17.0)), (1000, 2000, 500));
+    }
+}

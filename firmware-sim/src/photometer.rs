@@ -1,5 +1,7 @@
 mod device;
 mod registers;
+#[cfg(test)]
+mod tests;
 
 use std::time::Duration;
 

@@ -74,12 +74,8 @@ impl Servo {
         table.set(reg::ID, i64::from(fitting.id));
         table.set(reg::BAUD, i64::from(fitting.baud_code));
         table.set(reg::RETURN_DELAY, fitting.return_delay.as_micros() as i64 / 2);
-        if low < 0.0 || high >= TURN {
-            table.set(reg::OPERATING_MODE, 4);
-        } else {
-            table.set(reg::MIN_POSITION, low.floor() as i64);
-            table.set(reg::MAX_POSITION, high.ceil().min(TURN - 1.0) as i64);
-        }
+        table.set(reg::MIN_POSITION, low.floor().max(0.0) as i64);
+        table.set(reg::MAX_POSITION, high.ceil().min(TURN - 1.0) as i64);
         let mut servo = Self {
             profile: Path::resting(fitting.start, 0.0),
             shaft: Path::resting(fitting.start, fitting.backlash / 2.0),

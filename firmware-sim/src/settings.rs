@@ -86,11 +86,23 @@ impl Settings {
             .clone()
             .try_into()
             .map_err(|error: toml::de::Error| SimError::Form {
-                why: error.message().to_owned(),
+                // The message alone lacks the key; the error's text has it in a line of its own.
+                why: error.to_string().trim_end().replace('\n', " "),
             })?;
+        let park = rig.motion.park;
         let start = Pose::from_deg(
-            within("start_light_deg", raw.start_light_deg, -45.0, -90.0..=90.0)?,
-            within("start_sensor_deg", raw.start_sensor_deg, 45.0, -90.0..=90.0)?,
+            within(
+                "start_light_deg",
+                raw.start_light_deg,
+                park.light.deg(),
+                -90.0..=90.0,
+            )?,
+            within(
+                "start_sensor_deg",
+                raw.start_sensor_deg,
+                park.sensor.deg(),
+                -90.0..=90.0,
+            )?,
         );
         rig.envelope
             .check_pose(start)
@@ -207,4 +219,87 @@ fn within<T: PartialOrd + Display>(
 
 fn ms(key: &'static str, value: Option<f64>, default: f64, max: f64) -> Result<Duration, SimError> {
     within(key, value, default, 0.0..=max).map(|ms| Duration::from_secs_f64(ms / 1e3))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings(text: &str) -> Result<Settings, SimError> {
+        let rig = RigFile::parse(text, "test.toml".as_ref()).unwrap();
+        Settings::new(&rig)
+    }
+
+    fn error(sim: &str) -> String {
+        settings(&format!("[sim]\n{sim}")).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn the_shipped_file_shows_the_defaults() {
+        let is_key = |text: &str| text.bytes().all(|b| b.is_ascii_lowercase() || b == b'_');
+        let shown: String = RigFile::BUILT_IN
+            .lines()
+            .map(|line| match line.strip_prefix("# ") {
+                Some(text) if text.split_once(" = ").is_some_and(|(key, _)| is_key(key)) => {
+                    format!("{text}\n")
+                }
+                _ => format!("{line}\n"),
+            })
+            .collect();
+        let default = settings("").unwrap();
+        assert_eq!(settings(&shown).unwrap(), default);
+        // Every amount is shown: nothing is left of the other preset.
+        let other = shown.replace("imperfections = \"default\"", "imperfections = \"none\"");
+        assert_ne!(other, shown);
+        assert_eq!(settings(&other).unwrap(), default);
+        assert_eq!(default.imperfections, Imperfections::DEFAULT);
+    }
+
+    #[test]
+    fn none_means_none_and_an_amount_overrides_it() {
+        let none = settings("[sim]\nimperfections = \"none\"").unwrap();
+        assert_eq!(none.imperfections, Imperfections::NONE);
+        let some = settings("[sim]\nimperfections = \"none\"\nlamp_drift = 0.1").unwrap();
+        let expected = Imperfections {
+            lamp_drift: 0.1,
+            ..Imperfections::NONE
+        };
+        assert_eq!(some.imperfections, expected);
+    }
+
+    #[test]
+    fn errors_name_key_and_range() {
+        assert_eq!(
+            error("seed = -1"),
+            "sim.seed is -1, allowed: 0 … 9223372036854775807"
+        );
+        assert_eq!(
+            error("lamp_drift = nan"),
+            "sim.lamp_drift is NaN, allowed: 0 … 0.5"
+        );
+        assert_eq!(
+            error("boot_ms = 1e9"),
+            "sim.boot_ms is 1000000000, allowed: 0 … 10000"
+        );
+        assert!(
+            error("shot_nose = 1").contains("`shot_nose`"),
+            "{}",
+            error("shot_nose = 1")
+        );
+        assert!(
+            error("seed = \"one\"").contains("seed"),
+            "{}",
+            error("seed = \"one\"")
+        );
+        assert!(
+            error("clock = \"sun\"").contains("`wire`"),
+            "{}",
+            error("clock = \"sun\"")
+        );
+    }
+
+    #[test]
+    fn arms_do_not_start_where_they_may_not_be() {
+        assert!(error("start_light_deg = 44.0").contains("sim.start_light_deg"));
+    }
 }

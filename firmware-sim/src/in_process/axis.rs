@@ -65,45 +65,33 @@ impl InProcessAxis {
     /// Each way in which the servo is not what the rig file says.
     fn differences(&self) -> Result<Vec<String>, InProcessError> {
         let [velocity, _] = self.arm.axis.profile_registers(self.arm.profile);
-        let exactly = [
-            (servo::OPERATING_MODE, POSITION),
-            (servo::DRIVE_MODE, 0),
-            (servo::HOMING_OFFSET, 0),
+        let exactly = |value: i64| value..=value;
+        let rules = [
+            (servo::OPERATING_MODE, exactly(POSITION)),
+            (servo::DRIVE_MODE, exactly(0)),
+            (common::STATUS_RETURN_LEVEL, exactly(2)),
             (
                 common::RETURN_DELAY_TIME,
-                self.arm.return_delay.as_micros() as i64 / 2,
+                exactly(self.arm.return_delay.as_micros() as i64 / 2),
             ),
-        ];
-        let at_most = [(servo::MIN_POSITION_LIMIT, self.range[0].ceil() as i64)];
-        let at_least = [
-            (servo::MAX_POSITION_LIMIT, self.range[1].floor() as i64),
-            (servo::VELOCITY_LIMIT, i64::from(velocity)),
+            // Beyond, position mode ignores it.
+            (servo::HOMING_OFFSET, -1024..=1024),
+            (servo::MIN_POSITION_LIMIT, 0..=self.range[0].round() as i64),
+            (servo::MAX_POSITION_LIMIT, self.range[1].round() as i64..=4095),
+            (servo::VELOCITY_LIMIT, i64::from(velocity)..=1023),
         ];
         let mut differences = Vec::new();
-        let rules = exactly
-            .map(|(register, wanted)| (register, wanted..=wanted))
-            .into_iter()
-            .chain(at_most.map(|(register, wanted)| (register, i64::MIN..=wanted)))
-            .chain(at_least.map(|(register, wanted)| (register, wanted..=i64::MAX)));
         for (register, wanted) in rules {
             let found = self.read(register)?;
             if !wanted.contains(&found) {
-                let (name, bound) = (register.name, limit(&wanted));
+                let Register { name, address, .. } = register;
+                let (min, max) = wanted.into_inner();
                 differences.push(format!(
-                    "{name} is {found}, must be {bound}: write it to address {}",
-                    register.address
+                    "{name} is {found}, allowed: {min} … {max}; write it to address {address}"
                 ));
             }
         }
         Ok(differences)
-    }
-}
-
-fn limit(range: &std::ops::RangeInclusive<i64>) -> String {
-    match (*range.start(), *range.end()) {
-        (i64::MIN, max) => format!("at most {max}"),
-        (min, i64::MAX) => format!("at least {min}"),
-        (exactly, _) => exactly.to_string(),
     }
 }
 
@@ -159,10 +147,8 @@ impl Actuator for InProcessAxis {
             // It stands already, and takes no goal.
             return Ok(());
         }
-        let (present, velocity) = (
-            self.read(servo::PRESENT_POSITION)?,
-            self.read(servo::PRESENT_VELOCITY)?,
-        );
+        let present = self.read(servo::PRESENT_POSITION)? as f64;
+        let velocity = self.read(servo::PRESENT_VELOCITY)?;
         let acceleration = self.read(servo::PROFILE_ACCELERATION)?;
         let [v, a] = [
             velocity as f64 * rig::VELOCITY_UNIT_RAD_S,
@@ -172,7 +158,9 @@ impl Actuator for InProcessAxis {
             0 => 0.0,
             _ => v * v.abs() / (2.0 * a) * rig::COUNTS_PER_TURN / std::f64::consts::TAU,
         };
-        let goal = (present as f64 + way).clamp(self.range[0].ceil(), self.range[1].floor());
+        // Braking must not lead out of the limits, nor back.
+        let [low, high] = self.range.map(f64::round);
+        let goal = (present + way).clamp(low.min(present), high.max(present));
         self.write(servo::GOAL_POSITION, goal.round() as i64)
     }
 

@@ -137,3 +137,67 @@ fn turn(position: f64, velocity: f64, goal: f64, profile: Profile) -> Option<(f6
     let rest = position + velocity * velocity.abs() / (2.0 * a);
     ((goal - rest) * velocity < 0.0).then_some((velocity.abs() / a, rest))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PROFILE: Profile = Profile {
+        velocity_rad_s: 100.0,
+        acceleration_rad_s2: 200.0,
+    };
+
+    #[test]
+    fn what_follows_trails_by_half_the_play() {
+        let mut path = Path::resting(0.0, 2.0);
+        path.go(0.0, 100.0, PROFILE);
+        assert_eq!(path.follower(10.0), 98.0);
+        path.go(10.0, 97.0, PROFILE);
+        assert_eq!(path.follower(20.0), 98.0, "less than the play back");
+        path.go(20.0, 50.0, PROFILE);
+        assert_eq!(path.follower(30.0), 52.0);
+    }
+
+    #[test]
+    fn a_turn_within_a_motion_takes_up_the_play_on_both_sides() {
+        let mut path = Path::resting(0.0, 2.0);
+        path.go(0.0, 1000.0, PROFILE);
+        // Back in full flight: it turns at 75 + 25.
+        path.go(1.0, 90.0, PROFILE);
+        let (at_turn, speed) = path.at(1.5);
+        assert!(
+            (at_turn - 100.0).abs() < 1e-9 && speed.abs() < 1e-9,
+            "turns at {at_turn}"
+        );
+        assert!((path.follower(1.5) - 98.0).abs() < 1e-9);
+        assert_eq!(path.follower(20.0), 92.0);
+        // And only as far as the turn took it.
+        let mut path = Path::resting(0.0, 2.0);
+        path.go(0.0, 1000.0, PROFILE);
+        path.go(1.0, 98.0, PROFILE);
+        assert!((path.follower(20.0) - 98.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn forgetting_changes_nothing_later() {
+        let mut path = Path::resting(0.0, 1.0);
+        path.go(0.0, 100.0, PROFILE);
+        path.go(0.7, 20.0, PROFILE);
+        path.go(1.1, 60.0, PROFILE);
+        let mut short = path.clone();
+        short.forget(1.2);
+        assert_eq!(short.legs.len(), 1);
+        for i in 0..100 {
+            let t = 1.2 + f64::from(i) * 0.03;
+            assert_eq!((path.at(t), path.follower(t)), (short.at(t), short.follower(t)));
+        }
+    }
+
+    #[test]
+    fn a_motion_to_come_is_dropped_by_one_that_starts_before_it() {
+        let mut path = Path::resting(0.0, 0.0);
+        path.go(1.0, 100.0, PROFILE);
+        path.jump(0.5, 7.0);
+        assert_eq!(path.at(9.0), (7.0, 0.0));
+    }
+}

@@ -1,5 +1,9 @@
 use std::time::Duration;
 
+use proptest::prelude::*;
+use rig::dynamixel::MODELS;
+
+use super::Model;
 use crate::{Bench, Device, Disturbance, Fault, Refusal};
 
 fn s(seconds: f64) -> Duration {
@@ -93,16 +97,477 @@ fn a_goal_is_reached_and_said_to_be() {
     assert_eq!(read(&mut bench, 122, 1), 0);
 }
 
+fn disturb(bench: &mut Bench, at: f64, what: Disturbance) {
+    bench.schedule(Fault {
+        device: rig::Device::Light,
+        at: s(at),
+        what,
+    });
+}
+
+#[test]
+fn models_are_those_of_the_rig_file() {
+    for (name, number) in MODELS {
+        assert_eq!(
+            Model::named(name).map(|model| model.number),
+            Some(number),
+            "{name}"
+        );
+    }
+    assert_eq!(Model::names().count(), MODELS.len());
+}
+
+#[test]
+fn initial_values_are_the_manuals() {
+    let mut bench = bench("");
+    // Address, size, XM430-W350.
+    let manual = [
+        (0, 2, 1020),
+        (10, 1, 0),
+        (11, 1, 3),
+        (12, 1, 255),
+        (13, 1, 2),
+        (20, 4, 0),
+        (24, 4, 10),
+        (31, 1, 80),
+        (32, 2, 160),
+        (34, 2, 95),
+        (36, 2, 885),
+        (38, 2, 1193),
+        (44, 4, 200),
+        (63, 1, 52),
+        (64, 1, 0),
+        (68, 1, 2),
+        (76, 2, 1920),
+        (78, 2, 100),
+        (84, 2, 800),
+        (98, 1, 0),
+        (108, 4, 0),
+        (112, 4, 0),
+        (168, 2, 224),
+        (222, 2, 251),
+        (224, 1, 0),
+        (578, 2, 634),
+        (632, 2, 661),
+    ];
+    for (address, size, value) in manual {
+        assert_eq!(read(&mut bench, address, size), value, "address {address}");
+    }
+    assert_eq!(
+        light(&mut bench).read(0, 147).unwrap().len(),
+        147,
+        "holes read as zero"
+    );
+    assert_eq!(
+        light(&mut bench).read(661, 2),
+        Err(Refusal::Access),
+        "the table ends at 661"
+    );
+}
+
+#[test]
+fn the_workshop_has_set_what_the_rig_file_says() {
+    let mut bench = bench("");
+    assert_eq!(light(&mut bench).baud(), 1_000_000);
+    assert_eq!(light(&mut bench).return_delay(), Duration::ZERO);
+    // −88° and 88° about count 2048.
+    assert_eq!((read(&mut bench, 52, 4), read(&mut bench, 48, 4)), (1046, 3050));
+    assert_eq!(read(&mut bench, 132, 4), 1536);
+}
+
+#[test]
+fn writes_are_refused_as_the_manual_says_and_taken_whole_or_not_at_all() {
+    let mut bench = bench("");
+    let refusals = [
+        (132, 4, 0, Refusal::Access),
+        (66, 1, 0, Refusal::Access),
+        (661, 2, 0, Refusal::Access),
+        (116, 2, 0, Refusal::DataLength),
+        (117, 1, 0, Refusal::DataLength),
+        (64, 1, 2, Refusal::DataRange),
+        (11, 1, 2, Refusal::DataRange),
+        (98, 1, 128, Refusal::DataRange),
+        (112, 4, 32_768, Refusal::DataRange),
+        (116, 4, 1045, Refusal::DataLimit),
+        (116, 4, 3051, Refusal::DataLimit),
+        (104, 4, 201, Refusal::DataLimit),
+        (104, 4, -201, Refusal::DataLimit),
+        (102, 2, 1194, Refusal::DataLimit),
+    ];
+    for (address, size, value, refusal) in refusals {
+        assert_eq!(
+            write(&mut bench, address, size, value),
+            Err(refusal),
+            "{value} to {address}"
+        );
+    }
+    // Velocity would do, the goal beside it would not.
+    let both = [100i32.to_le_bytes(), 4000i32.to_le_bytes()].concat();
+    assert_eq!(light(&mut bench).write(112, &both), Err(Refusal::DataLimit));
+    assert_eq!(read(&mut bench, 112, 4), 0);
+}
+
+#[test]
+fn torque_locks_the_eeprom_and_sets_the_goal_to_the_present_position() {
+    let mut bench = bench("");
+    write(&mut bench, 116, 4, 2000).unwrap();
+    write(&mut bench, 64, 1, 1).unwrap();
+    assert_eq!(read(&mut bench, 116, 4), 1536);
+    assert_eq!(write(&mut bench, 9, 1, 0), Err(Refusal::Access));
+    bench.advance_to(s(1.0));
+    assert_eq!(read(&mut bench, 132, 4), 1536, "nothing moved");
+    write(&mut bench, 64, 1, 0).unwrap();
+    write(&mut bench, 9, 1, 10).unwrap();
+    assert_eq!(light(&mut bench).return_delay(), Duration::from_micros(20));
+}
+
+#[test]
+fn no_torque_no_motion() {
+    let mut bench = bench("");
+    write(&mut bench, 116, 4, 2000).unwrap();
+    bench.advance_to(s(1.0));
+    assert_eq!(read(&mut bench, 132, 4), 1536);
+    go(&mut bench, 43, 9, 2000);
+    bench.advance_to(s(1.5));
+    write(&mut bench, 64, 1, 0).unwrap();
+    let stopped = read(&mut bench, 132, 4);
+    bench.advance_to(s(3.0));
+    assert!((1537..2000).contains(&stopped));
+    assert_eq!(read(&mut bench, 132, 4), stopped);
+}
+
+#[test]
+fn a_goal_without_profile_is_a_step_of_the_trajectory() {
+    let mut bench = bench("");
+    go(&mut bench, 0, 0, 2036);
+    assert_eq!(read(&mut bench, 140, 4), 2036);
+    assert_eq!(read(&mut bench, 123, 1), 0b1000, "following error, no profile");
+    bench.advance_to(s(0.1));
+    // The motor does what it can, its velocity limit of 200 · 15.63 counts/s.
+    assert_eq!(read(&mut bench, 128, 4), 200);
+    assert_eq!(read(&mut bench, 132, 4), 1536 + 313);
+    bench.advance_to(s(0.2));
+    assert_eq!(read(&mut bench, 132, 4), 2036);
+}
+
+#[test]
+fn profile_types_and_durations() {
+    // Velocity, acceleration, drive mode, profile type, seconds for 1000 counts.
+    let cases: [(i64, i64, i64, &[i64], f64); 6] = [
+        (40, 0, 0, &[1], 63.967 * 1000.0 / 40.0 / 1e3),
+        (
+            40,
+            10,
+            0,
+            &[3],
+            (64.033 * 40.0 / 10.0 + 63.967 * 1000.0 / 40.0) / 1e3,
+        ),
+        (1000, 10, 0, &[2], 2.0 * (1000.0 / 2441.4_f64).sqrt()),
+        (1500, 300, 4, &[3], 1.5),
+        (1500, 0, 4, &[1], 1.5),
+        // The acceleration time is at most half of the whole: a triangle, but for rounding.
+        (1500, 1400, 4, &[2, 3], 1.5),
+    ];
+    for (velocity, acceleration, mode, kinds, seconds) in cases {
+        let mut bench = bench("");
+        write(&mut bench, 10, 1, mode).unwrap();
+        go(&mut bench, velocity, acceleration, 2536);
+        let case = format!("V={velocity}, A={acceleration}, drive mode {mode}");
+        let kind = read(&mut bench, 123, 1) >> 4;
+        assert!(kinds.contains(&kind), "{case}: type {kind}");
+        let took = motion_s(&mut bench);
+        assert!(
+            (took / seconds - 1.0).abs() < 1e-3,
+            "{case} took {took} s, not {seconds} s"
+        );
+        assert_eq!(read(&mut bench, 132, 4), 2536, "{case}");
+    }
+}
+
+#[test]
+fn the_velocity_limit_bounds_a_profile() {
+    let mut bench = bench("");
+    write(&mut bench, 44, 4, 20).unwrap();
+    go(&mut bench, 100, 0, 2536);
+    bench.advance_to(s(0.5));
+    assert_eq!(read(&mut bench, 128, 4), 20);
+}
+
+#[test]
+fn a_new_goal_takes_over_from_the_present_velocity() {
+    let mut bench = bench("");
+    go(&mut bench, 40, 5, 2800);
+    bench.advance_to(s(1.0));
+    let (position, velocity) = (read(&mut bench, 132, 4), read(&mut bench, 128, 4));
+    assert_eq!(velocity, 40);
+    write(&mut bench, 116, 4, 1400).unwrap();
+    assert_eq!(
+        (read(&mut bench, 132, 4), read(&mut bench, 128, 4)),
+        (position, velocity)
+    );
+    bench.advance_to(s(1.1));
+    assert!(read(&mut bench, 132, 4) > position, "it does not turn at once");
+    bench.advance_to(s(8.0));
+    assert_eq!(read(&mut bench, 132, 4), 1400);
+}
+
+#[test]
+fn the_homing_offset_shifts_the_register_and_is_ignored_beyond_a_quarter_turn() {
+    let mut bench = bench("");
+    write(&mut bench, 20, 4, 100).unwrap();
+    assert_eq!(read(&mut bench, 132, 4), 1636);
+    go(&mut bench, 100, 0, 1736);
+    bench.advance_to(s(2.0));
+    assert_eq!(read(&mut bench, 132, 4), 1736);
+    assert!(
+        (bench.pose().light.deg() + 36.2).abs() < 0.05,
+        "the arm went by 100 counts"
+    );
+    write(&mut bench, 64, 1, 0).unwrap();
+    write(&mut bench, 20, 4, 1025).unwrap();
+    assert_eq!(read(&mut bench, 132, 4), 1636, "ignored in position mode");
+    write(&mut bench, 11, 1, 4).unwrap();
+    assert_eq!(
+        read(&mut bench, 132, 4),
+        1636 + 1025,
+        "taken in extended position mode"
+    );
+}
+
+#[test]
+fn reverse_mode_turns_the_other_way() {
+    let mut bench = bench("");
+    write(&mut bench, 10, 1, 1).unwrap();
+    let from = read(&mut bench, 132, 4);
+    assert_eq!(from, 4096 - 1536);
+    go(&mut bench, 100, 0, from + 100);
+    bench.advance_to(s(1.0));
+    assert_eq!(read(&mut bench, 132, 4), from + 100);
+    assert!((bench.pose().light.deg() + 53.8).abs() < 0.05);
+}
+
+#[test]
+fn a_goal_may_switch_the_torque_on() {
+    let mut bench = bench("");
+    write(&mut bench, 10, 1, 8).unwrap();
+    write(&mut bench, 112, 4, 100).unwrap();
+    write(&mut bench, 116, 4, 1600).unwrap();
+    assert_eq!(read(&mut bench, 64, 1), 1);
+    bench.advance_to(s(1.0));
+    assert_eq!(read(&mut bench, 132, 4), 1600);
+}
+
+#[test]
+fn the_watchdog_stops_a_servo_that_hears_nothing() {
+    let mut bench = bench("");
+    go(&mut bench, 20, 5, 2800);
+    write(&mut bench, 98, 1, 10).unwrap();
+    bench.advance_to(s(0.15));
+    light(&mut bench).heard();
+    bench.advance_to(s(0.349_999));
+    assert_eq!(read(&mut bench, 98, 1), 10);
+    bench.advance_to(s(0.350_001));
+    assert_eq!((read(&mut bench, 98, 1), read(&mut bench, 122, 1)), (255, 0));
+    let stopped = read(&mut bench, 132, 4);
+    assert_eq!(write(&mut bench, 116, 4, 2000), Err(Refusal::DataRange));
+    assert_eq!(write(&mut bench, 98, 1, 5), Err(Refusal::DataRange));
+    bench.advance_to(s(1.0));
+    assert_eq!(read(&mut bench, 132, 4), stopped);
+    write(&mut bench, 98, 1, 0).unwrap();
+    write(&mut bench, 116, 4, 2000).unwrap();
+    bench.advance_to(s(9.0));
+    assert_eq!(read(&mut bench, 132, 4), 2000);
+}
+
 #[test]
 fn overload_takes_the_torque_until_a_reboot() {
     let mut bench = bench("");
-    bench.schedule(Fault {
-        device: rig::Device::Light,
-        at: s(0.5),
-        what: Disturbance::OVERLOAD,
-    });
+    disturb(&mut bench, 0.5, Disturbance::OVERLOAD);
     go(&mut bench, 43, 9, 2048);
     bench.advance_to(s(2.0));
     assert_eq!((read(&mut bench, 64, 1), read(&mut bench, 70, 1)), (0, 32));
     assert!(light(&mut bench).alert());
+    let stopped = read(&mut bench, 132, 4);
+    write(&mut bench, 64, 1, 1).unwrap();
+    write(&mut bench, 116, 4, 2000).unwrap();
+    bench.advance_to(s(4.0));
+    assert_eq!(
+        (read(&mut bench, 64, 1), read(&mut bench, 132, 4)),
+        (0, stopped),
+        "ignored"
+    );
+    light(&mut bench).reboot();
+    assert!(!light(&mut bench).listens());
+    bench.advance_to(s(4.5));
+    assert!(light(&mut bench).listens());
+    assert_eq!(
+        (
+            read(&mut bench, 70, 1),
+            read(&mut bench, 112, 4),
+            read(&mut bench, 132, 4)
+        ),
+        (0, 0, stopped)
+    );
+    go(&mut bench, 43, 9, 2000);
+    bench.advance_to(s(9.0));
+    assert_eq!(read(&mut bench, 132, 4), 2000);
+}
+
+#[test]
+fn an_error_that_shutdown_does_not_name_only_alerts() {
+    let mut bench = bench("");
+    disturb(&mut bench, 0.5, Disturbance::ALERT);
+    go(&mut bench, 43, 9, 2048);
+    bench.advance_to(s(9.0));
+    assert!(light(&mut bench).alert());
+    assert_eq!((read(&mut bench, 64, 1), read(&mut bench, 132, 4)), (1, 2048));
+}
+
+#[test]
+fn a_stalled_shaft_falls_behind_and_goes_on() {
+    let mut bench = bench("");
+    disturb(&mut bench, 0.5, Disturbance::Stall(s(2.0)));
+    go(&mut bench, 43, 9, 2048);
+    bench.advance_to(s(0.5));
+    let stuck = read(&mut bench, 132, 4);
+    bench.advance_to(s(1.5));
+    assert_eq!(read(&mut bench, 132, 4), stuck);
+    assert_eq!(read(&mut bench, 123, 1) & 0b1000, 0b1000, "following error");
+    assert_eq!(read(&mut bench, 126, 2), 1193, "at its current limit");
+    bench.advance_to(s(9.0));
+    assert_eq!(read(&mut bench, 132, 4), 2048);
+}
+
+#[test]
+fn the_shaft_is_late_by_the_lag() {
+    let mut bench = bench("following_lag_ms = 20.0");
+    go(&mut bench, 100, 0, 2536);
+    bench.advance_to(s(0.2));
+    let (planned, present) = (read(&mut bench, 140, 4), read(&mut bench, 132, 4));
+    // 20 ms at 1563 counts/s, both rounded.
+    assert!(
+        (31..=32).contains(&(planned - present)),
+        "{} counts behind",
+        planned - present
+    );
+    bench.advance_to(s(5.0));
+    assert_eq!(read(&mut bench, 132, 4), 2536);
+}
+
+#[test]
+fn indirect_data_show_and_take_what_their_addresses_say() {
+    let mut bench = bench("");
+    // Torque enable, present position, goal position.
+    let map = [64u16, 132, 133, 134, 135, 116, 117, 118, 119];
+    let bytes: Vec<u8> = map.iter().flat_map(|address| address.to_le_bytes()).collect();
+    light(&mut bench).write(168, &bytes).unwrap();
+    go(&mut bench, 100, 0, 1600);
+    bench.advance_to(s(1.0));
+    let shown = light(&mut bench).read(224, 9).unwrap();
+    assert_eq!(shown, [1, 0x40, 6, 0, 0, 0x40, 6, 0, 0]);
+    light(&mut bench).write(229, &1700i32.to_le_bytes()).unwrap();
+    assert_eq!(read(&mut bench, 116, 4), 1700);
+    assert_eq!(
+        light(&mut bench).write(225, &[0; 4]),
+        Err(Refusal::Access),
+        "present position"
+    );
+    // A cell that leads nowhere else keeps what it is given.
+    light(&mut bench).write(240, &[7]).unwrap();
+    assert_eq!(read(&mut bench, 240, 1), 7);
+}
+
+#[test]
+fn turns_are_lost_on_clear_and_reboot() {
+    let mut bench = bench("");
+    write(&mut bench, 11, 1, 4).unwrap();
+    go(&mut bench, 200, 0, 6000);
+    assert_eq!(
+        light(&mut bench).clear(&[1, 0x44, 0x58, 0x4C, 0x22]),
+        Err(Refusal::Result),
+        "it moves"
+    );
+    bench.advance_to(s(5.0));
+    assert_eq!(read(&mut bench, 132, 4), 6000);
+    assert_eq!(light(&mut bench).clear(&[1, 0, 0, 0, 0]), Err(Refusal::DataRange));
+    light(&mut bench).clear(&[1, 0x44, 0x58, 0x4C, 0x22]).unwrap();
+    assert_eq!(read(&mut bench, 132, 4), 6000 - 4096);
+    write(&mut bench, 116, 4, -3000).unwrap();
+    bench.advance_to(s(10.0));
+    assert_eq!(read(&mut bench, 132, 4), -3000);
+    light(&mut bench).reboot();
+    assert_eq!(read(&mut bench, 132, 4), 4096 - 3000);
+}
+
+#[test]
+fn a_factory_reset_keeps_what_it_is_told_to() {
+    for (option, id, baud) in [(0xFF, 1, 57_600), (1, 9, 57_600), (2, 9, 2_000_000)] {
+        let mut bench = bench("");
+        write(&mut bench, 7, 1, 9).unwrap();
+        write(&mut bench, 8, 1, 4).unwrap();
+        light(&mut bench).factory_reset(option).unwrap();
+        assert_eq!(
+            (light(&mut bench).id(), light(&mut bench).baud()),
+            (id, baud),
+            "option {option}"
+        );
+        assert_eq!(read(&mut bench, 9, 1), 250);
+    }
+    assert_eq!(light(&mut bench("")).factory_reset(3), Err(Refusal::DataRange));
+}
+
+#[test]
+fn the_realtime_tick_wraps() {
+    let mut bench = bench("");
+    bench.advance_to(s(32.767));
+    assert_eq!(read(&mut bench, 120, 2), 32_767);
+    bench.advance_to(s(32.768));
+    assert_eq!(read(&mut bench, 120, 2), 0);
+}
+
+/// What is written to a moving servo, and when.
+fn commands() -> impl Strategy<Value = Vec<(u64, i64)>> {
+    prop::collection::vec((1u64..1_500_000, 1100i64..3000), 1..6)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// In how many steps time passes changes nothing: positions after random goals, a stall and a watchdog that may
+    /// trip are the same for a host that polls every `step` and for one that does not poll.
+    #[test]
+    fn prop_motion_does_not_depend_on_polling(
+        commands in commands(), step_us in 10u64..1_000_000, velocity in 0i64..150, acceleration in 0i64..40,
+        lag_ms in 0u32..30, backlash_deg in 0.0f64..0.5, stall in any::<bool>(),
+    ) {
+        let run = |step: Option<Duration>| {
+            let mut bench = bench(&format!("following_lag_ms = {lag_ms}.0\nlight_backlash_deg = {backlash_deg}"));
+            if stall {
+                disturb(&mut bench, 0.7, Disturbance::Stall(s(0.4)));
+            }
+            go(&mut bench, velocity, acceleration, 1600);
+            write(&mut bench, 98, 1, 60).unwrap();
+            let mut seen = Vec::new();
+            let mut t = Duration::ZERO;
+            for &(after_us, goal) in &commands {
+                let until = t + Duration::from_micros(after_us);
+                // At most 200 polls, else this takes long.
+                let step = step.map(|step| step.max((until - t) / 200));
+                while let Some(step) = step && t + step < until {
+                    t += step;
+                    bench.advance_to(t);
+                    read(&mut bench, 132, 4);
+                }
+                t = until;
+                bench.advance_to(t);
+                seen.push((bench.pose().light.deg(), light(&mut bench).read(98, 49).unwrap()));
+                light(&mut bench).heard();
+                let _refused_once_tripped = write(&mut bench, 116, 4, goal);
+            }
+            bench.advance_to(t + s(1.0));
+            seen.push((bench.pose().light.deg(), light(&mut bench).read(98, 49).unwrap()));
+            seen
+        };
+        prop_assert_eq!(run(Some(Duration::from_micros(step_us))), run(None));
+    }
 }
