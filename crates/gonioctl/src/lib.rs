@@ -1,6 +1,62 @@
-//! The technician's command line.
+//! The technician's command line: a thin client of the libraries, which does nothing that they lack.
+//!
+//! Data goes to stdout, talk to stderr; the exit code says how it ended.
+
+mod cli;
+mod exit;
+mod plan;
+mod ports;
+mod print;
+mod progress;
+mod reconstruct;
+mod run;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+use cli::{Cli, Command};
+use run::Task;
+use tracing_subscriber::EnvFilter;
 
 /// Runs the command line of this process and returns its exit code.
-pub fn main() -> std::process::ExitCode {
-    std::process::ExitCode::from(2)
+pub fn main() -> ExitCode {
+    tracing_subscriber::fmt()
+        .with_env_filter(EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn")))
+        .with_writer(std::io::stderr)
+        .init();
+    match command(Cli::parse().command) {
+        Ok(code) => code,
+        Err(error) => {
+            let (code, text) = exit::failure(&error);
+            print::say(format_args!("gonioctl: {text}"));
+            code
+        }
+    }
+}
+
+fn command(command: Command) -> anyhow::Result<ExitCode> {
+    match command {
+        Command::Ports { output } => ports::ports(output.json)?,
+        Command::Plan { job, rig, output } => plan::plan(&job, rig.rig.as_deref(), output.json)?,
+        Command::Run {
+            job,
+            rig,
+            out,
+            resume,
+            output,
+        } => {
+            let task = match (&job, &resume) {
+                (_, Some(directory)) => Task::Resume(directory),
+                (Some(job), None) => Task::New {
+                    job,
+                    rig: rig.rig.as_deref(),
+                    out: &out,
+                },
+                (None, None) => unreachable!("clap requires one of them"),
+            };
+            return run::run(&task, output.json);
+        }
+        Command::Reconstruct { run, output } => reconstruct::reconstruct(run, output.json)?,
+    }
+    Ok(ExitCode::SUCCESS)
 }

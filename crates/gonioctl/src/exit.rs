@@ -1,0 +1,25 @@
+use std::error::Error;
+use std::io;
+use std::process::ExitCode;
+
+use goniod::Status;
+
+/// Exit code of a finished command.
+pub(crate) fn code(status: Status) -> ExitCode {
+    ExitCode::from(status.code())
+}
+
+/// Exit code of an error, and the error in one line with all its causes.
+pub(crate) fn failure(error: &anyhow::Error) -> (ExitCode, String) {
+    let status = error.chain().find_map(status).unwrap_or(Status::Invalid);
+    (code(status), format!("{error:#}"))
+}
+
+/// What one error of a chain says about the exit code.
+fn status(error: &(dyn Error + 'static)) -> Option<Status> {
+    if let Some(error) = error.downcast_ref::<goniod::DaemonError>() {
+        return Some(error.status());
+    }
+    let io = error.downcast_ref::<io::Error>()?;
+    report::is_full(io).then_some(Status::Stopped)
+}

@@ -1,0 +1,86 @@
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use goniod::Order;
+use serde_json::json;
+use sweep::Plan;
+
+use crate::print;
+use crate::progress::clock;
+
+/// Says what a job would do; touches no hardware.
+///
+/// # Errors
+/// What is wrong with the job or the rig file.
+pub(crate) fn plan(job: &Path, rig: Option<&Path>, as_json: bool) -> anyhow::Result<()> {
+    let order = Order::read(job, rig)?;
+    let plan = order.plan(None)?;
+    if as_json {
+        print::json(&json!({
+            "seconds": plan.seconds(),
+            "overhead_s": plan.overhead_s,
+            "readings": plan.steps.len(),
+            "left_out": plan.left_out,
+            "steps": plan.steps.iter().map(step).collect::<Vec<_>>(),
+        }))?;
+        return Ok(());
+    }
+    list(&plan)?;
+    Ok(())
+}
+
+/// A step for machines, in degrees.
+fn step(step: &sweep::Step) -> serde_json::Value {
+    let pose = step.pose();
+    json!({
+        "index": step.index,
+        "sweep": step.sweep.to_string(),
+        "light_deg": pose.light.deg(),
+        "sensor_deg": pose.sensor.deg(),
+        "d_p": pose.deviation().abs(),
+        "lamp": step.lamp,
+        "legs": step.path.len(),
+        "seconds": step.seconds,
+    })
+}
+
+/// A plan for people: each sweep in a line, then what is left out.
+fn list(plan: &Plan) -> std::io::Result<()> {
+    let mut sweeps: BTreeMap<usize, (String, usize, f64)> = BTreeMap::new();
+    let mut order: Vec<String> = Vec::new();
+    for step in &plan.steps {
+        let name = step.sweep.to_string();
+        let place = order.iter().position(|known| *known == name).unwrap_or_else(|| {
+            order.push(name.clone());
+            order.len() - 1
+        });
+        let sweep = sweeps.entry(place).or_insert((name, 0, 0.0));
+        sweep.1 += 1;
+        sweep.2 += step.seconds;
+    }
+    for (name, readings, seconds) in sweeps.into_values() {
+        print::line(format_args!(
+            "{name:<10} {readings:>5} readings {:>12}",
+            clock(seconds)
+        ))?;
+    }
+    print::line(format_args!(
+        "{:<10} {:>14} {:>12}",
+        "warm-up",
+        "",
+        clock(plan.overhead_s)
+    ))?;
+    print::line(format_args!(
+        "{:<10} {:>5} readings {:>12}",
+        "together",
+        plan.steps.len(),
+        clock(plan.seconds())
+    ))?;
+    for left_out in &plan.left_out {
+        print::line(format_args!(
+            "left out: {} ({} readings): {}",
+            left_out.what, left_out.readings, left_out.why
+        ))?;
+    }
+    Ok(())
+}

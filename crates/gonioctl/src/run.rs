@@ -1,0 +1,129 @@
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use capture::{Command, Event, Outcome};
+use goniod::{DaemonError, Ended, Order};
+use serde_json::json;
+use tokio::sync::watch;
+
+use crate::progress::{Progress, clock};
+use crate::{exit, print};
+
+/// What `run` is to do.
+pub(crate) enum Task<'a> {
+    /// A new run of a job.
+    New {
+        job: &'a Path,
+        rig: Option<&'a Path>,
+        out: &'a Path,
+    },
+    /// Go on with a run directory.
+    Resume(&'a Path),
+}
+
+/// Captures, reconstructs and says where everything is.
+///
+/// # Errors
+/// Whatever keeps the run from beginning, or its results from being written.
+pub(crate) fn run(task: &Task<'_>, json: bool) -> anyhow::Result<ExitCode> {
+    let begun = Instant::now();
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(1)
+        .enable_all()
+        .build()?;
+    let ended = runtime.block_on(async {
+        let (sender, control) = watch::channel(Command::Run);
+        // Before anything can move.
+        let interrupts = tokio::signal::unix::signal(tokio::signal::unix::SignalKind::interrupt())?;
+        tokio::spawn(obey(interrupts, sender));
+        capture(task, control).await
+    })?;
+    let wall_s = begun.elapsed().as_secs_f64();
+    if json {
+        print::json(&summary(&ended, wall_s))?;
+    } else {
+        say(&ended, wall_s);
+        print::line(ended.directory.path().display())?;
+    }
+    Ok(exit::code(ended.status()))
+}
+
+/// The first Ctrl-C finishes the reading and holds, the second stops at once.
+async fn obey(mut interrupts: tokio::signal::unix::Signal, sender: watch::Sender<Command>) {
+    let words = [
+        (
+            Command::Stop,
+            "stopping after this reading; again for an emergency stop",
+        ),
+        (Command::Estop, "emergency stop"),
+    ];
+    for (command, word) in words {
+        if interrupts.recv().await.is_none() {
+            return;
+        }
+        print::say(word);
+        // Nobody listens any more once the capture has ended.
+        let _ = sender.send(command);
+    }
+}
+
+async fn capture(task: &Task<'_>, control: watch::Receiver<Command>) -> anyhow::Result<Ended> {
+    let mut progress = Progress::new();
+    let mut show = |event: Event| {
+        tracing::debug!(?event);
+        progress.show(&event);
+    };
+    let ended: Result<Ended, DaemonError> = match task {
+        Task::New { job, rig, out } => {
+            let order = Order::read(job, *rig)?;
+            goniod::run(&order, out, control, &mut show).await
+        }
+        Task::Resume(directory) => goniod::resume(directory, control, &mut show).await,
+    };
+    progress.finish();
+    Ok(ended?)
+}
+
+/// The summary for machines.
+fn summary(ended: &Ended, wall_s: f64) -> serde_json::Value {
+    let run = &ended.report.run;
+    json!({
+        "id": run.id,
+        "state": run.state,
+        "exit_status": ended.status().code(),
+        "fault": run.fault,
+        "directory": ended.directory.path(),
+        "rig_seconds": run.seconds.total,
+        "wall_seconds": wall_s,
+        "readings": run.readings,
+        "retries": run.retries,
+        "flags": run.flags,
+    })
+}
+
+/// The summary for people.
+fn say(ended: &Ended, wall_s: f64) {
+    let run = &ended.report.run;
+    match &ended.outcome {
+        Outcome::Done => print::say("done"),
+        Outcome::Stopped => print::say("stopped; the readings so far are safe"),
+        Outcome::Failed { fault } => print::say(format_args!("failed: {fault}")),
+    }
+    print::say(format_args!(
+        "rig time  {} ({:.1} s; what a real rig takes)",
+        clock(run.seconds.total),
+        run.seconds.total
+    ));
+    print::say(format_args!("wall time {wall_s:.1} s"));
+    print::say(format_args!(
+        "readings  {} taken, {} of {} steps done, {} retries on the bus",
+        run.readings.taken, run.readings.accepted, run.readings.planned, run.retries
+    ));
+    if ended.outcome != Outcome::Done {
+        print::say(format_args!(
+            "go on with: gonioctl run --resume {}",
+            ended.directory.path().display()
+        ));
+    }
+}

@@ -1,0 +1,85 @@
+use std::path::{Path, PathBuf};
+
+use arms::Pose;
+use capture::Header;
+use rig::RigFile;
+use sweep::{Job, Plan};
+
+use crate::DaemonError;
+
+/// Where a rig file is looked for when none is named, seen from the working directory.
+const RIG_HERE: &str = "config/rig.toml";
+
+/// A job and the rig that is to do it, both read and checked; nothing was touched yet.
+#[derive(Clone, Debug)]
+pub struct Order {
+    /// What is to be measured.
+    pub job: Job,
+    /// The rig.
+    pub rig: RigFile,
+    /// The job file as given.
+    pub job_text: String,
+    /// The rig file as given.
+    pub rig_text: String,
+    /// What messages call the rig file.
+    pub rig_name: String,
+}
+
+impl Order {
+    /// Reads a job file and a rig file: the one named, else config/rig.toml in the working directory if there is one,
+    /// else the built-in one.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or what is wrong in it with its place.
+    pub fn read(job: &Path, rig: Option<&Path>) -> Result<Self, DaemonError> {
+        let job_text = read("job file", job)?;
+        let (rig_text, rig_name) = match rig {
+            Some(path) => (read("rig file", path)?, path.to_owned()),
+            None if Path::new(RIG_HERE).exists() => {
+                (read("rig file", Path::new(RIG_HERE))?, PathBuf::from(RIG_HERE))
+            }
+            None => (RigFile::BUILT_IN.to_owned(), PathBuf::from("built-in rig file")),
+        };
+        Self::parse(job_text, &job.to_string_lossy(), rig_text, &rig_name)
+    }
+
+    /// The order of a run that was begun before, from its journal.
+    ///
+    /// # Errors
+    /// Texts that this version does not accept any more.
+    pub fn resumed(header: &Header) -> Result<Self, DaemonError> {
+        let (job, rig) = (header.job.clone(), header.rig.clone());
+        Self::parse(job, "the run's job file", rig, Path::new("the run's rig file"))
+    }
+
+    fn parse(
+        job_text: String,
+        job_name: &str,
+        rig_text: String,
+        rig_name: &Path,
+    ) -> Result<Self, DaemonError> {
+        Ok(Self {
+            job: Job::parse(&job_text, job_name)?,
+            rig: RigFile::parse(&rig_text, rig_name)?,
+            job_text,
+            rig_text,
+            rig_name: rig_name.display().to_string(),
+        })
+    }
+
+    /// What the order becomes on its rig, with the arms standing at `start`.
+    ///
+    /// # Errors
+    /// What of the job this rig cannot do, or that the arms stand where no motion may begin.
+    pub fn plan(&self, start: Option<Pose>) -> Result<Plan, DaemonError> {
+        Ok(sweep::plan(&self.job, &capture::mechanics(&self.rig, start))?)
+    }
+}
+
+fn read(what: &'static str, path: &Path) -> Result<String, DaemonError> {
+    std::fs::read_to_string(path).map_err(|source| DaemonError::Read {
+        what,
+        path: path.to_owned(),
+        source,
+    })
+}

@@ -1,0 +1,127 @@
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use capture::{Command, Event, FileJournal, Header, Journal, Outcome, Record};
+use report::{Report, RunDirectory};
+use tokio::sync::watch;
+
+use crate::{DaemonError, Order, Status, station::Station};
+
+/// How a run ended, and what came of it.
+#[derive(Debug)]
+pub struct Ended {
+    /// Where everything is.
+    pub directory: RunDirectory,
+    /// How the capture ended.
+    pub outcome: Outcome,
+    /// What the run directory says.
+    pub report: Report,
+}
+
+impl Ended {
+    /// The exit status.
+    pub fn status(&self) -> Status {
+        match self.outcome {
+            Outcome::Done => Status::Done,
+            Outcome::Stopped => Status::Stopped,
+            Outcome::Failed { .. } => Status::Rig,
+        }
+    }
+}
+
+/// Carries out an order: opens the rig, plans from where its arms stand, captures into a new run directory under
+/// `out`, and writes everything that follows from the readings.
+///
+/// All that can be wrong with files, specimen, directory, port and devices is found before a run directory is made
+/// and before anything moves.
+///
+/// # Errors
+/// What is wrong with them; a journal that cannot be written any more (what it holds is safe); a report that cannot
+/// be written (`reconstruct` makes it again).
+pub async fn run(
+    order: &Order,
+    out: &Path,
+    control: watch::Receiver<Command>,
+    on_event: &mut (dyn FnMut(Event) + Send),
+) -> Result<Ended, DaemonError> {
+    // A job that this rig can never do need not wait for the rig to answer.
+    order.plan(None)?;
+    prepare(out)?;
+    let mut station = Station::open(order)?;
+    let start = station.start().await?;
+    let plan = order.plan(Some(start))?;
+    let now = SystemTime::now();
+    let id = ulid::Ulid::generate();
+    let directory = RunDirectory::at(out.join(name(now, &id)));
+    fs::create_dir(directory.path()).map_err(unwritable(out))?;
+    let header = Header {
+        run: id.to_string(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        job: order.job_text.clone(),
+        rig: order.rig_text.clone(),
+        plan,
+        started: humantime::format_rfc3339_seconds(now).to_string(),
+    };
+    let mut journal = FileJournal::create(directory.journal(), header)?;
+    finish(directory, &mut station, &mut journal, control, on_event).await
+}
+
+/// Goes on with a run that was stopped or failed; a run that is done already is only reported again.
+///
+/// # Errors
+/// As [`run`]; and a directory that holds no run.
+pub async fn resume(
+    directory: &Path,
+    control: watch::Receiver<Command>,
+    on_event: &mut (dyn FnMut(Event) + Send),
+) -> Result<Ended, DaemonError> {
+    let directory = RunDirectory::at(directory);
+    let mut journal = FileJournal::open(directory.journal())?;
+    let Some(Record::Header(header)) = journal.records().first() else {
+        return Err(capture::CaptureError::NoHeader.into());
+    };
+    let order = Order::resumed(header)?;
+    let mut station = Station::open(&order)?;
+    finish(directory, &mut station, &mut journal, control, on_event).await
+}
+
+async fn finish(
+    directory: RunDirectory,
+    station: &mut Station,
+    journal: &mut FileJournal,
+    control: watch::Receiver<Command>,
+    on_event: &mut (dyn FnMut(Event) + Send),
+) -> Result<Ended, DaemonError> {
+    let outcome = capture::run(&mut station.drive, journal, control, on_event).await?;
+    let report = report::write(&directory, journal.records())?;
+    Ok(Ended {
+        directory,
+        outcome,
+        report,
+    })
+}
+
+/// Makes the directory of the run directories and tries whether it can be written.
+fn prepare(out: &Path) -> Result<(), DaemonError> {
+    fs::create_dir_all(out).map_err(unwritable(out))?;
+    let probe = out.join(format!(".writable-{}", std::process::id()));
+    let tried = fs::File::create(&probe).and_then(|mut file| file.write_all(b"1"));
+    let removed = fs::remove_file(&probe);
+    tried.and(removed).map_err(unwritable(out))
+}
+
+fn unwritable(path: &Path) -> impl Fn(std::io::Error) -> DaemonError {
+    move |source| DaemonError::Out {
+        path: PathBuf::from(path),
+        source,
+    }
+}
+
+/// Name of a run directory: when it began, so that a listing is in order, and its id.
+fn name(began: SystemTime, id: &ulid::Ulid) -> String {
+    let time = humantime::format_rfc3339_seconds(began).to_string();
+    let time = time.replace([':', '-'], "").replace('T', "-");
+    format!("{}-{id}", time.trim_end_matches('Z'))
+}

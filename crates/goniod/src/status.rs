@@ -1,0 +1,20 @@
+/// How a command ended; its code is the exit code.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Status {
+    /// Everything was done.
+    Done = 0,
+    /// Bad arguments, config or file; nothing was touched.
+    Invalid = 2,
+    /// Rig fault or missing device.
+    Rig = 3,
+    /// Stopped before the end, or the disk is full: can be resumed.
+    Stopped = 4,
+}
+
+impl Status {
+    /// The exit code.
+    pub const fn code(self) -> u8 {
+        self as u8
+    }
+}

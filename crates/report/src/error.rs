@@ -1,0 +1,37 @@
+use std::io;
+use std::path::PathBuf;
+
+/// Why a run directory could not be read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReportError {
+    /// A file of the run directory could not be written; nothing under its name was touched.
+    #[error("cannot write {path}")]
+    Write {
+        /// Which one.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The journal cannot be read.
+    #[error(transparent)]
+    Journal(#[from] capture::JournalError),
+    /// The journal does not begin with a header.
+    #[error("{path} has no header, so no plan")]
+    NoHeader {
+        /// The journal.
+        path: PathBuf,
+    },
+    /// This version does not accept the run's job file.
+    #[error("the job file in the journal")]
+    Job(#[source] sweep::SweepError),
+    /// This version does not accept the run's rig file.
+    #[error("the rig file in the journal")]
+    Rig(#[source] rig::RigError),
+}
+
+/// Whether an I/O error says that there is no room: no space, quota, or a file size limit.
+pub fn is_full(error: &io::Error) -> bool {
+    use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+    matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
+}

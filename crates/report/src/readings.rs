@@ -1,0 +1,86 @@
+use std::io;
+
+use serde::Serialize;
+
+use crate::Observation;
+use crate::run::flag_name;
+
+/// One row of readings.csv. The order of the columns is fixed; new ones come at the end.
+#[derive(Serialize)]
+struct Row {
+    index: usize,
+    sweep: String,
+    light_commanded_deg: f64,
+    sensor_commanded_deg: f64,
+    light_measured_deg: f64,
+    sensor_measured_deg: f64,
+    theta_r_deg: f64,
+    d_p: f64,
+    phi_p_deg: f64,
+    counts_r: u32,
+    counts_g: u32,
+    counts_b: u32,
+    counts_monitor: u32,
+    gain: u16,
+    integration_us: u32,
+    time_s: f64,
+    f_r: Option<f64>,
+    f_g: Option<f64>,
+    f_b: Option<f64>,
+    flags: String,
+    step: usize,
+    attempt: u32,
+    accepted: bool,
+    retries: u32,
+}
+
+impl Row {
+    fn new(index: usize, observation: &Observation) -> Self {
+        let Observation {
+            reading,
+            pdv,
+            reflectance,
+            time_s,
+        } = observation;
+        let flags: Vec<&str> = reading.flags.iter().map(|&flag| flag_name(flag)).collect();
+        Self {
+            index,
+            sweep: reading.sweep.to_string(),
+            light_commanded_deg: reading.goal.light.deg(),
+            sensor_commanded_deg: reading.goal.sensor.deg(),
+            light_measured_deg: reading.measured.light.deg(),
+            sensor_measured_deg: reading.measured.sensor.deg(),
+            theta_r_deg: pdv.theta_r.to_degrees(),
+            d_p: pdv.d_p,
+            phi_p_deg: pdv.phi_p.to_degrees(),
+            counts_r: reading.counts.rgb[0],
+            counts_g: reading.counts.rgb[1],
+            counts_b: reading.counts.rgb[2],
+            counts_monitor: reading.counts.monitor,
+            gain: reading.counts.exposure.gain.into(),
+            integration_us: reading.counts.exposure.integration_us,
+            time_s: *time_s,
+            f_r: reflectance.map(|f| f.x),
+            f_g: reflectance.map(|f| f.y),
+            f_b: reflectance.map(|f| f.z),
+            flags: flags.join("|"),
+            step: reading.step,
+            attempt: reading.attempt,
+            accepted: reading.accepted,
+            retries: reading.retries,
+        }
+    }
+}
+
+/// Writes readings.csv: one row a reading, in the order in which they were taken; reflectance in sr⁻¹, empty where a
+/// reading has none (lamp off, saturated).
+///
+/// # Errors
+/// The medium refused.
+pub fn write_readings(observations: &[Observation], out: impl io::Write) -> io::Result<()> {
+    let mut writer = csv::Writer::from_writer(out);
+    for (index, observation) in observations.iter().enumerate() {
+        writer.serialize(Row::new(index, observation))?;
+    }
+    writer.flush()
+}

@@ -1,0 +1,189 @@
+//! Bad input is found before anything moves: exit 2, and a message that names the file, the key and what is allowed.
+
+// The exemption for tests does not reach what they share.
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::Path;
+
+use tests::{Finished, Simulator, run};
+
+const GONIOCTL: &str = env!("CARGO_BIN_EXE_e2e-gonioctl");
+
+const JOB: &str = "
+[[plane]]
+theta_r_deg = 70.0
+readings = 10
+[arc]
+readings = 10
+";
+
+/// One thing that is wrong, and what the message must say.
+struct Case {
+    name: &'static str,
+    job: &'static str,
+    /// Lines of the rig file; `PORT` stands for the simulator's terminal.
+    rig: &'static str,
+    says: &'static [&'static str],
+}
+
+const CASES: [Case; 13] = [
+    Case {
+        name: "unknown key in the job",
+        job: "speciment = \"x\"\n[[plane]]\ntheta_r_deg = 70.0\nreadings = 10\n",
+        rig: "[bus]\nport = \"PORT\"\n",
+        says: &["job.toml", "line 1", "speciment"],
+    },
+    Case {
+        name: "wrong type in the job",
+        job: "[[plane]]\ntheta_r_deg = 70.0\nreadings = \"many\"\n",
+        rig: "[bus]\nport = \"PORT\"\n",
+        says: &["job.toml", "line 3", "readings"],
+    },
+    Case {
+        name: "plane out of range",
+        job: "[[plane]]\ntheta_r_deg = 89.0\nreadings = 10\n",
+        rig: "[bus]\nport = \"PORT\"\n",
+        says: &["job.toml", "theta_r_deg", "89", "0 … 85"],
+    },
+    Case {
+        name: "plane beyond the limits of this rig",
+        job: JOB,
+        rig: "[bus]\nport = \"PORT\"\n[sensor]\nmax_deg = 60.0\n",
+        says: &["job.toml", "plane[0].theta_r_deg", "70", "60"],
+    },
+    Case {
+        name: "arms that would meet",
+        job: "[[plane]]\ntheta_r_deg = 10.0\nreadings = 10\n",
+        rig: "[bus]\nport = \"PORT\"\n[light]\nmin_deg = 0.0\nmax_deg = 40.0\n[envelope]\nseparation_deg = 60.0\n[motion]\npark_light_deg = 5.0\npark_sensor_deg = 70.0\n[sim]\nstart_light_deg = 5.0\nstart_sensor_deg = 70.0\n",
+        says: &["job.toml", "plane[0]", "60"],
+    },
+    Case {
+        name: "unknown key in the rig file",
+        job: JOB,
+        rig: "[bus]\nport = \"PORT\"\n[motion]\nsettle = 20\n",
+        says: &["rig.toml", "settle"],
+    },
+    Case {
+        name: "wrong type in the rig file",
+        job: JOB,
+        rig: "[bus]\nport = \"PORT\"\nbaud = \"fast\"\n",
+        says: &["rig.toml", "line 3", "baud"],
+    },
+    Case {
+        name: "value out of range in the rig file",
+        job: JOB,
+        rig: "[bus]\nport = \"PORT\"\n[light]\nmin_deg = -95.0\n",
+        says: &["rig.toml", "light.min_deg", "-95", "-90"],
+    },
+    Case {
+        name: "unknown material",
+        job: JOB,
+        rig: "[bus]\nport = \"sim\"\n[sim]\nspecimen = \"gold-pain\"\n",
+        says: &["rig.toml", "sim.specimen", "gold-pain", "gold-paint"],
+    },
+    Case {
+        name: "unknown key of the simulator",
+        job: JOB,
+        rig: "[bus]\nport = \"sim\"\n[sim]\nspeciment = \"gold-paint\"\n",
+        says: &["rig.toml", "sim", "speciment"],
+    },
+    Case {
+        name: "truncated MERL file",
+        job: JOB,
+        rig: "[bus]\nport = \"sim\"\n[sim]\nspecimen = \"./short.binary\"\n",
+        says: &["rig.toml", "sim.specimen", "short.binary", "34992012"],
+    },
+    Case {
+        name: "missing MERL file",
+        job: JOB,
+        rig: "[bus]\nport = \"sim\"\n[sim]\nspecimen = \"./none.binary\"\n",
+        says: &["rig.toml", "sim.specimen", "none.binary"],
+    },
+    Case {
+        name: "missing port",
+        job: JOB,
+        rig: "[bus]\nport = \"/dev/tty-no-such-port\"\n",
+        says: &["bus.port", "/dev/tty-no-such-port"],
+    },
+];
+
+/// Runs the job of a case; asserts that nothing moved, no run was begun, and no directory was left behind.
+fn refused(case: &Case) -> Finished {
+    let temporary = tempfile::tempdir().unwrap();
+    let directory = temporary.path();
+    let simulator = Simulator::new("");
+    let port = simulator.server.path().display().to_string();
+    fs::write(directory.join("job.toml"), case.job).unwrap();
+    fs::write(directory.join("rig.toml"), case.rig.replace("PORT", &port)).unwrap();
+    fs::write(directory.join("short.binary"), vec![0; 1000]).unwrap();
+    let finished = run(GONIOCTL, directory, &["run", "job.toml", "--rig", "rig.toml"]);
+    assert_eq!(
+        simulator.server.counters().goals,
+        0,
+        "{}: an arm was told to move",
+        case.name
+    );
+    let runs = fs::read_dir(directory.join("runs")).map_or(0, Iterator::count);
+    assert_eq!(runs, 0, "{}: a run was begun", case.name);
+    finished
+}
+
+#[test]
+fn every_mistake_is_named_and_nothing_moves() {
+    for case in &CASES {
+        let finished = refused(case);
+        assert_eq!(finished.code, 2, "{}: {}", case.name, finished.stderr);
+        for said in case.says {
+            assert!(
+                finished.stderr.contains(said),
+                "{}: \"{said}\" is missing in: {}",
+                case.name,
+                finished.stderr
+            );
+        }
+        assert_eq!(finished.stdout, "", "{}: talk belongs on stderr", case.name);
+    }
+}
+
+#[test]
+fn a_port_in_use_is_refused() {
+    let temporary = tempfile::tempdir().unwrap();
+    let simulator = Simulator::new("");
+    simulator.rig_file(temporary.path());
+    fs::write(temporary.path().join("job.toml"), JOB).unwrap();
+    let port = simulator.server.path().display().to_string();
+    let _held = serialport::new(&port, 1_000_000).open_native().unwrap();
+    let arguments = ["run", "job.toml", "--rig", "rig.toml"];
+    let finished = run(GONIOCTL, temporary.path(), &arguments).expect(2);
+    assert!(finished.stderr.contains(&port), "{}", finished.stderr);
+    assert!(finished.stderr.contains("in use"), "{}", finished.stderr);
+    assert_eq!(simulator.server.counters().goals, 0);
+}
+
+#[test]
+fn an_out_directory_that_cannot_be_written_is_refused() {
+    let temporary = tempfile::tempdir().unwrap();
+    let simulator = Simulator::new("");
+    simulator.rig_file(temporary.path());
+    fs::write(temporary.path().join("job.toml"), JOB).unwrap();
+    // Also root cannot make a directory below a file, or below what the kernel makes up.
+    fs::write(temporary.path().join("file"), "").unwrap();
+    for out in ["file", "file/below", "/proc/no-runs-here"] {
+        let arguments = ["run", "job.toml", "--rig", "rig.toml", "--out", out];
+        let finished = run(GONIOCTL, temporary.path(), &arguments).expect(2);
+        assert!(finished.stderr.contains(out), "{}", finished.stderr);
+        assert_eq!(simulator.server.counters().goals, 0, "{out}");
+    }
+}
+
+#[test]
+fn missing_files_are_named() {
+    let temporary = tempfile::tempdir().unwrap();
+    let finished = run(GONIOCTL, temporary.path(), &["run", "none.toml"]).expect(2);
+    assert!(finished.stderr.contains("none.toml"), "{}", finished.stderr);
+    let resume = ["run", "--resume", "no-run"];
+    let finished = run(GONIOCTL, temporary.path(), &resume).expect(2);
+    assert!(finished.stderr.contains("no-run"), "{}", finished.stderr);
+    assert!(!Path::new(&temporary.path().join("runs")).exists());
+}
