@@ -63,26 +63,11 @@ impl Bench {
     pub fn with_specimen(rig: &RigFile, specimen: Arc<dyn Brdf>) -> Result<Self, SimError> {
         let settings = Settings::new(rig)?;
         let amounts = settings.imperfections;
-        let mut once = ChaCha8Rng::seed_from_u64(settings.seed);
-        once.set_stream(ONCE);
-        let lamp = Lamp::new(
-            amounts.lamp_warm_up.as_secs_f64(),
-            amounts.lamp_drift,
-            amounts.lamp_flicker,
-            &mut once,
-        );
         let baud_code = baud::code(rig.bus.baud).ok_or_else(|| SimError::Device {
             what: "baud rate",
             found: rig.bus.baud.to_string(),
             allowed: "9600, 57600, 115200, 1000000, 2000000, 3000000, 4000000, 4500000".to_owned(),
         })?;
-        let photometer = photometer::Fitting {
-            id: rig.photometer.id,
-            baud_code,
-            boot: settings.boot,
-            ambient_c: settings.ambient_c,
-            self_heating_c: amounts.self_heating_c,
-        };
         let mut bench = Self {
             now: Duration::ZERO,
             clock: settings.clock,
@@ -91,7 +76,7 @@ impl Bench {
                 Servo::new(fitting(rig, &settings, Arm::Light, baud_code)?),
                 Servo::new(fitting(rig, &settings, Arm::Sensor, baud_code)?),
             ],
-            photometer: Photometer::new(photometer, lamp),
+            photometer: photometer(rig, &settings, baud_code),
             photodiodes: Photodiodes {
                 calibration: rig.calibration,
                 full_scale: rig.photometer.full_scale,
@@ -254,6 +239,22 @@ impl Bench {
             })
             .sum()
     }
+}
+
+fn photometer(rig: &RigFile, settings: &Settings, baud_code: u8) -> Photometer {
+    let amounts = settings.imperfections;
+    let mut once = ChaCha8Rng::seed_from_u64(settings.seed);
+    once.set_stream(ONCE);
+    let warm_up_s = amounts.lamp_warm_up.as_secs_f64();
+    let fitting = photometer::Fitting {
+        id: rig.photometer.id,
+        baud_code,
+        boot: settings.boot,
+        ambient_c: settings.ambient_c,
+        self_heating_c: amounts.self_heating_c,
+    };
+    let lamp = Lamp::new(warm_up_s, amounts.lamp_drift, amounts.lamp_flicker, &mut once);
+    Photometer::new(fitting, lamp)
 }
 
 fn fitting(rig: &RigFile, settings: &Settings, arm: Arm, baud_code: u8) -> Result<servo::Fitting, SimError> {

@@ -45,6 +45,9 @@ pub(crate) struct Fitting {
 
 /// An X-series servo: its control table and the motion behind it.
 ///
+/// It moves in the position modes (3, 4, 5). The modes for wheels and torque can be set, so that a host can be seen
+/// to refuse them, and hold the shaft still. Gains are kept without effect; backup and restore do not exist.
+///
 /// Motion happens in shaft counts: where the shaft is, on a line that goes on over many turns. Position registers
 /// show that line with direction, lost turns and homing offset.
 #[derive(Debug)]

@@ -59,6 +59,10 @@ impl Device for Servo {
         Ok(())
     }
 
+    fn registered(&mut self, waits: bool) {
+        self.table.set(reg::REGISTERED_INSTRUCTION, i64::from(waits));
+    }
+
     fn reboot(&mut self) {
         self.table.reset(|register| register.access != Access::Eeprom);
         self.deaf_until = self.now + self.fitting.boot;

@@ -517,6 +517,27 @@ fn a_factory_reset_keeps_what_it_is_told_to() {
 }
 
 #[test]
+fn a_registered_instruction_shows() {
+    let mut bench = bench("");
+    for waits in [true, false] {
+        light(&mut bench).registered(waits);
+        assert_eq!(read(&mut bench, 69, 1), i64::from(waits));
+    }
+}
+
+#[test]
+fn other_modes_hold_the_shaft_still() {
+    for mode in [0, 1, 16] {
+        let mut bench = bench("");
+        write(&mut bench, 11, 1, mode).unwrap();
+        go(&mut bench, 43, 9, 2048);
+        write(&mut bench, 104, 4, 100).unwrap();
+        bench.advance_to(s(2.0));
+        assert_eq!(read(&mut bench, 132, 4), 1536, "mode {mode}");
+    }
+}
+
+#[test]
 fn the_realtime_tick_wraps() {
     let mut bench = bench("");
     bench.advance_to(s(32.767));
