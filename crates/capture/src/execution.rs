@@ -231,7 +231,8 @@ impl<'a, R: Rig> Execution<'a, R> {
             self.done[step.index] = true;
             let passed = reading.device_ticks.saturating_sub(self.mark);
             self.mark = reading.device_ticks;
-            self.progress.step(step.seconds, passed as f64 / TICKS_PER_S);
+            self.progress
+                .step(step.sweep, step.seconds, passed as f64 / TICKS_PER_S);
         }
         self.emit(Event::Reading {
             reading: Box::new(reading),
@@ -254,12 +255,10 @@ impl<'a, R: Rig> Execution<'a, R> {
                 let slice = left.min(LOOK);
                 self.drive.wait(slice).await?;
                 left -= slice;
-                self.look_at_clock().await?;
+                self.look().await?;
             }
-            let now = self.look_at_clock().await?;
-            self.progress
-                .step(self.plan.overhead_s, (now - self.mark) as f64 / TICKS_PER_S);
-            self.mark = now;
+            self.mark = self.look().await?;
+            self.progress.warm();
             self.state(State::Running);
         }
         Ok(())
@@ -280,11 +279,9 @@ impl<'a, R: Rig> Execution<'a, R> {
                 paused = true;
                 self.state(State::Paused);
             }
-            // The host's clock, since a simulator's runs ahead only when told to wait. The look keeps the watchdogs
-            // from tripping.
+            // The host's clock, since a simulator's runs ahead only when told to wait.
             let _ = tokio::time::timeout(LOOK, self.control.changed()).await;
-            self.drive.snapshot().await?;
-            self.mark = self.look_at_clock().await?;
+            self.mark = self.look().await?;
         }
         if paused {
             self.state(State::Running);
@@ -292,8 +289,9 @@ impl<'a, R: Rig> Execution<'a, R> {
         Ok(())
     }
 
-    /// Reads the photometer's clock, so that no wrap is missed.
-    async fn look_at_clock(&mut self) -> Result<u64, Interrupt<R::Error>> {
+    /// Looks at every device, so that no watchdog trips, and at the photometer's clock, so that no wrap is missed.
+    async fn look(&mut self) -> Result<u64, Interrupt<R::Error>> {
+        self.drive.snapshot().await?;
         let ticks = self.drive.ticks().await?;
         Ok(self.clock.unwrap(ticks))
     }
@@ -333,9 +331,10 @@ impl<'a, R: Rig> Execution<'a, R> {
             };
         }
         let device_ticks = match unsafe_left.is_empty() {
-            true => self.look_at_clock().await.ok(),
+            true => self.drive.ticks().await.ok(),
             false => None,
         };
+        let device_ticks = device_ticks.map(|ticks| self.clock.unwrap(ticks));
         self.journal.append(&Record::End {
             outcome: outcome.clone(),
             device_ticks,

@@ -1,17 +1,25 @@
-use sweep::Plan;
+use sweep::{Plan, Sweep};
 
-/// Seconds of plan that count like measured ones when the first measurements come in, against a jumpy start.
-const PRIOR_S: f64 = 2.0;
+/// Seconds of plan that count like measured ones, against a jumpy start.
+const PRIOR_S: f64 = 5.0;
 
-/// How long a run still takes: the planned seconds of what is left, times how much slower or faster than planned the
-/// rig has been in this execution. Times are the photometer's.
+/// How long a run still takes: the planned seconds of what is left of each sweep, times how much slower or faster
+/// than planned that sweep has been in this execution. One sweep says little of the next, whose light may be weaker
+/// and its exposures longer. Times are the photometer's.
 #[derive(Clone, Debug)]
 pub(crate) struct Progress {
-    /// Planned seconds of the steps of this execution that are done.
-    planned_s: f64,
-    /// Planned seconds of the steps that are not.
+    /// Warm-up still to come, s.
+    warm_up_s: f64,
+    sweeps: Vec<(Sweep, Pace)>,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Pace {
+    /// Planned seconds of the steps that are not done.
     left_s: f64,
-    /// Measured seconds that the former took.
+    /// Planned seconds of the steps done in this execution.
+    planned_s: f64,
+    /// Measured seconds that these took.
     measured_s: f64,
 }
 
@@ -23,23 +31,43 @@ impl Progress {
         } else {
             0.0
         };
-        let left_s = warm_up_s + left().map(|step| step.seconds).sum::<f64>();
-        Self {
-            planned_s: 0.0,
-            left_s,
-            measured_s: 0.0,
+        let mut progress = Self {
+            warm_up_s,
+            sweeps: Vec::new(),
+        };
+        for step in left() {
+            progress.pace(step.sweep).left_s += step.seconds;
         }
+        progress
     }
 
-    /// A step, or the warm-up, is done that was planned to take `planned_s` and took `measured_s`.
-    pub(crate) fn step(&mut self, planned_s: f64, measured_s: f64) {
-        self.planned_s += planned_s;
-        self.left_s -= planned_s;
-        self.measured_s += measured_s;
+    /// The lamp is warm.
+    pub(crate) fn warm(&mut self) {
+        self.warm_up_s = 0.0;
+    }
+
+    /// A step is done that was planned to take `planned_s` and took `measured_s`.
+    pub(crate) fn step(&mut self, sweep: Sweep, planned_s: f64, measured_s: f64) {
+        let pace = self.pace(sweep);
+        pace.left_s -= planned_s;
+        pace.planned_s += planned_s;
+        pace.measured_s += measured_s;
     }
 
     /// Seconds still needed.
     pub(crate) fn seconds_left(&self) -> f64 {
-        self.left_s.max(0.0) * (self.measured_s + PRIOR_S) / (self.planned_s + PRIOR_S)
+        let left = |(_, pace): &(Sweep, Pace)| {
+            pace.left_s.max(0.0) * (pace.measured_s + PRIOR_S) / (pace.planned_s + PRIOR_S)
+        };
+        self.warm_up_s + self.sweeps.iter().map(left).sum::<f64>()
+    }
+
+    fn pace(&mut self, sweep: Sweep) -> &mut Pace {
+        let known = self.sweeps.iter().position(|(of, _)| *of == sweep);
+        let i = known.unwrap_or_else(|| {
+            self.sweeps.push((sweep, Pace::default()));
+            self.sweeps.len() - 1
+        });
+        &mut self.sweeps[i].1
     }
 }

@@ -1,0 +1,352 @@
+use std::panic::AssertUnwindSafe;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
+
+use capture::{CaptureError, Command, Event, JournalError, Outcome, Record, State};
+use rig::Device;
+use rig::dynamixel::register::{common, servo};
+
+use crate::bench::{MemoryJournal, SERVOS, SHORT, Scene, assert_complete, peek};
+
+/// Gives a command when so many readings are taken.
+fn after(
+    readings: usize,
+    control: &tokio::sync::watch::Sender<Command>,
+    command: Command,
+) -> impl FnMut(Event) + Send + use<> {
+    let control = control.clone();
+    let mut taken = 0;
+    move |event| {
+        if matches!(event, Event::Reading { .. }) {
+            taken += 1;
+            if taken == readings {
+                control.send_replace(command);
+            }
+        }
+    }
+}
+
+/// What must be the same whether a run was stopped or not.
+fn essence(journal: &MemoryJournal) -> Vec<(usize, u32, [u32; 3], rig::Exposure, arms::Pose)> {
+    let reading = |reading: &&capture::Reading| {
+        (
+            reading.step,
+            reading.attempt,
+            reading.counts.rgb,
+            reading.counts.exposure,
+            reading.measured,
+        )
+    };
+    journal.readings().iter().map(reading).collect()
+}
+
+#[tokio::test(start_paused = true)]
+async fn stopped_anywhere_and_resumed_gives_the_readings_of_an_undisturbed_run() {
+    let sim = "specimen = \"gold-paint\"\nimperfections = \"none\"";
+    let mut undisturbed = Scene::new(SHORT, sim).await;
+    undisturbed.run(|_| ()).await.unwrap();
+    let whole = essence(&undisturbed.journal);
+    for at in 1..whole.len() {
+        let mut scene = Scene::new(SHORT, sim).await;
+        let stop = after(at, &scene.control, Command::Stop);
+        let outcome = scene.run(stop).await.unwrap();
+        scene.assert_safe();
+        if outcome == Outcome::Done {
+            assert!(
+                scene.journal.readings().len() - at < 2,
+                "only the last step is finished in spite of a stop"
+            );
+            continue;
+        }
+        assert_eq!(outcome, Outcome::Stopped);
+        let last = *scene.journal.readings().last().unwrap();
+        assert!(last.accepted, "stopped at {at}: the reading in hand is finished");
+        scene.control.send_replace(Command::Run);
+        assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+        assert_complete(&scene.journal);
+        assert_eq!(essence(&scene.journal), whole, "stopped after reading {at}");
+        let ticks: Vec<u64> = scene
+            .journal
+            .readings()
+            .iter()
+            .map(|reading| reading.device_ticks)
+            .collect();
+        assert!(
+            ticks.windows(2).all(|pair| pair[0] < pair[1]),
+            "device time runs on"
+        );
+        scene.assert_safe();
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_run_is_resumed_from_wherever_the_arms_are_then() {
+    let mut scene = Scene::new(SHORT, "").await;
+    let stop = after(30, &scene.control, Command::Stop);
+    assert_eq!(scene.run(stop).await.unwrap(), Outcome::Stopped);
+    scene.drive.engage_all().await.unwrap();
+    scene
+        .drive
+        .travel(&[arms::Pose::from_deg(-80.0, 20.0)])
+        .await
+        .unwrap();
+    scene.drive.disengage_all().await;
+    scene.control.send_replace(Command::Run);
+    assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+    assert_complete(&scene.journal);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_finished_run_has_nothing_left_to_measure() {
+    let mut scene = Scene::new(SHORT, "").await;
+    scene.run(|_| ()).await.unwrap();
+    let readings = scene.journal.readings().len();
+    assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+    assert_eq!(scene.journal.readings().len(), readings);
+    scene.assert_safe();
+}
+
+#[tokio::test(start_paused = true)]
+async fn other_devices_do_not_go_on_with_a_run() {
+    let mut scene = Scene::new(SHORT, "").await;
+    let stop = after(30, &scene.control, Command::Stop);
+    scene.run(stop).await.unwrap();
+    for record in &mut scene.journal.records {
+        if let Record::Begin { identities, .. } = record {
+            identities[1].firmware += 1;
+        }
+    }
+    scene.control.send_replace(Command::Run);
+    let (pose, readings) = (scene.bench.pose(), scene.journal.readings().len());
+    let error = scene.run(|_| ()).await.unwrap_err();
+    assert!(matches!(error, CaptureError::OtherDevices { .. }), "{error}");
+    assert_eq!(
+        (scene.bench.pose(), scene.journal.readings().len()),
+        (pose, readings)
+    );
+    scene.assert_safe();
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_journal_without_header_runs_nothing() {
+    let mut scene = Scene::new(SHORT, "").await;
+    scene.journal.records.clear();
+    assert!(matches!(scene.run(|_| ()).await, Err(CaptureError::NoHeader)));
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_pause_holds_everything_until_it_ends() {
+    let mut scene = Scene::new(SHORT, "").await;
+    let control = scene.control.clone();
+    let bench = scene.bench.clone();
+    let mut pause = after(35, &scene.control, Command::Pause);
+    let mut paused_at = None;
+    let mut story = Vec::new();
+    let outcome = scene.run(|event| {
+        match &event {
+            Event::State { state: State::Paused } => {
+                paused_at = Some((bench.now(), bench.pose()));
+                let control = control.clone();
+                // Longer than every watchdog and than the photometer's clock counts.
+                tokio::spawn(async move {
+                    tokio::time::sleep(Duration::from_secs(300)).await;
+                    control.send_replace(Command::Run);
+                });
+            }
+            Event::State {
+                state: State::Running,
+            } if paused_at.is_some() => {
+                let (since, pose) = paused_at.expect("just asked");
+                assert!(bench.now() - since >= Duration::from_secs(300));
+                assert_eq!(bench.pose(), pose);
+                assert_eq!(
+                    peek(
+                        &bench,
+                        Device::Photometer,
+                        rig::dynamixel::register::photometer::LAMP_ENABLE
+                    ),
+                    1
+                );
+            }
+            _ => {}
+        }
+        if let Event::State { state } = &event {
+            story.push(*state);
+        }
+        pause(event);
+    });
+    assert_eq!(outcome.await.unwrap(), Outcome::Done);
+    assert!(story.contains(&State::Paused));
+    assert_complete(&scene.journal);
+    let last = scene.journal.readings().last().unwrap().device_ticks as f64 * 1e-5;
+    assert!(last > 300.0, "device time includes the pause: {last} s");
+    scene.assert_safe();
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_paused_run_can_be_stopped() {
+    let mut scene = Scene::new(SHORT, "").await;
+    let control = scene.control.clone();
+    let mut pause = after(35, &scene.control, Command::Pause);
+    let outcome = scene.run(|event| {
+        if event == (Event::State { state: State::Paused }) {
+            control.send_replace(Command::Stop);
+        }
+        pause(event);
+    });
+    assert_eq!(outcome.await.unwrap(), Outcome::Stopped);
+    scene.assert_safe();
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_stop_during_warm_up_does_not_wait_for_its_end() {
+    let mut scene = Scene::new(SHORT, "").await;
+    let control = scene.control.clone();
+    let outcome = scene.run(|event| {
+        if event
+            == (Event::State {
+                state: State::WarmingUp,
+            })
+        {
+            control.send_replace(Command::Stop);
+        }
+    });
+    assert_eq!(outcome.await.unwrap(), Outcome::Stopped);
+    scene.assert_safe();
+    assert!(scene.journal.readings().iter().all(|reading| !reading.lamp));
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_emergency_stop_halts_arms_on_their_way_at_once() {
+    let mut scene = Scene::new(SHORT, "").await;
+    let (control, bench) = (scene.control.clone(), scene.bench.clone());
+    let stopped_at = std::sync::Arc::new(std::sync::Mutex::new(None));
+    let told = stopped_at.clone();
+    let outcome = scene.run(move |event| {
+        // The first step with the lamp on has a long way to go.
+        if let Event::Step { sweep, .. } = event
+            && sweep != sweep::Sweep::Dark
+            && told.lock().unwrap().is_none()
+        {
+            let (control, bench, told) = (control.clone(), bench.clone(), told.clone());
+            *told.lock().unwrap() = Some(Duration::ZERO);
+            tokio::spawn(async move {
+                tokio::time::sleep(Duration::from_millis(500)).await;
+                assert_eq!(
+                    peek(&bench, Device::Light, servo::MOVING),
+                    1,
+                    "stopped while it moves"
+                );
+                *told.lock().unwrap() = Some(bench.now());
+                control.send_replace(Command::Estop);
+            });
+        }
+    });
+    let outcome = outcome.await.unwrap();
+    assert_eq!(
+        outcome,
+        Outcome::Failed {
+            fault: "emergency stop".to_owned()
+        }
+    );
+    let took = scene.bench.now() - stopped_at.lock().unwrap().unwrap();
+    assert!(
+        took < Duration::from_millis(20),
+        "{took:?} from the command to the end"
+    );
+    tokio::time::sleep(Duration::from_millis(100)).await;
+    scene.assert_safe();
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_panic_of_whoever_watches_leaves_the_rig_safe() {
+    let calls = AtomicUsize::new(0);
+    loop {
+        let mut scene = Scene::new(SHORT, "").await;
+        let panic_at = calls.fetch_add(7, Ordering::Relaxed);
+        let mut seen = 0;
+        let run = scene.run(|_| {
+            seen += 1;
+            assert!(seen != panic_at + 1, "made to panic");
+        });
+        // The panic must come out of `run` itself, after it has put everything in order.
+        let result = catch(run).await;
+        scene.assert_safe();
+        match result {
+            Err(panic) => assert_eq!(panic.downcast_ref::<&str>(), Some(&"made to panic")),
+            Ok(outcome) => {
+                assert_eq!(outcome.unwrap(), Outcome::Done, "no event was left to panic at");
+                break;
+            }
+        }
+    }
+    assert!(calls.into_inner() > 100, "panics at many events");
+}
+
+async fn catch<T>(future: impl Future<Output = T>) -> std::thread::Result<T> {
+    let mut future = std::pin::pin!(future);
+    std::future::poll_fn(|context| {
+        match std::panic::catch_unwind(AssertUnwindSafe(|| future.as_mut().poll(context))) {
+            Ok(poll) => poll.map(Ok),
+            Err(panic) => std::task::Poll::Ready(Err(panic)),
+        }
+    })
+    .await
+}
+
+/// Nothing can be awaited in a drop, so the watchdogs must do.
+#[tokio::test(start_paused = true)]
+async fn a_capture_that_is_dropped_falls_to_the_watchdogs() {
+    let mut scene = Scene::new(SHORT, "").await;
+    let bench = scene.bench.clone();
+    let waiting = tokio::time::timeout(Duration::from_millis(2600), scene.run(|_| ())).await;
+    assert!(waiting.is_err(), "still running");
+    assert!(scene.lamp_is_on(), "dropped in the middle of it");
+    tokio::time::sleep(Duration::from_millis(1500)).await;
+    assert!(!scene.lamp_is_on());
+    for device in SERVOS {
+        assert_eq!(peek(&bench, device, servo::MOVING), 0, "{device}");
+        assert_eq!(peek(&bench, device, common::BUS_WATCHDOG), 255, "{device}");
+    }
+    assert_eq!(
+        scene.run(|_| ()).await.unwrap(),
+        Outcome::Done,
+        "and can be resumed"
+    );
+    assert_complete(&scene.journal);
+    scene.assert_safe();
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_full_disk_ends_the_run_at_rest_and_loses_nothing() {
+    for full_at in [1, 2, 10, 25, 26, 40] {
+        let mut scene = Scene::new(SHORT, "").await;
+        let mut appended = 0;
+        scene.journal.at_append = Box::new(move |_| {
+            appended += 1;
+            if appended < full_at {
+                return Ok(());
+            }
+            let source = std::io::ErrorKind::StorageFull.into();
+            Err(JournalError::Io {
+                what: "write",
+                path: "journal".into(),
+                source,
+            })
+        });
+        let error = scene.run(|_| ()).await.unwrap_err();
+        assert!(matches!(error, CaptureError::Journal(_)), "{error}");
+        scene.assert_safe();
+        assert_eq!(scene.journal.records.len(), full_at, "with the header");
+        scene.journal.at_append = Box::new(|_| Ok(()));
+        assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+        assert_complete(&scene.journal);
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_capture_can_run_in_a_task_of_its_own() {
+    let mut scene = Scene::new(SHORT, "").await;
+    let task = tokio::spawn(async move { scene.run(|_| ()).await.unwrap() });
+    assert_eq!(task.await.unwrap(), Outcome::Done);
+}
