@@ -82,13 +82,13 @@ fn written_and_read_it_is_the_same() {
 
 #[test]
 fn a_file_is_written_whole_or_not_at_all() {
-    let directory = std::env::temp_dir().join(format!("brdf-merl-{}", std::process::id()));
-    std::fs::create_dir_all(&directory).unwrap();
+    let directory = tempfile::tempdir().unwrap();
+    let directory = directory.path();
     let path = directory.join("gold-paint.binary");
     TABLE.write(&path).unwrap();
     assert_eq!(std::fs::read(&path).unwrap(), *BYTES);
     assert_eq!(
-        std::fs::read_dir(&directory).unwrap().count(),
+        std::fs::read_dir(directory).unwrap().count(),
         1,
         "a temporary file is left"
     );
@@ -107,7 +107,6 @@ fn a_file_is_written_whole_or_not_at_all() {
         TABLE.write(&nowhere),
         Err(Error::Io { what: "write", .. })
     ));
-    std::fs::remove_dir_all(&directory).unwrap();
 }
 
 #[test]

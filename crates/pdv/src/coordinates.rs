@@ -124,3 +124,171 @@ pub fn light_angle(theta_r: f64, deviation: f64) -> Option<f64> {
     let sin = deviation - theta_r.sin();
     (sin.abs() <= RIM).then(|| sin.atan2(cos_from_sin(sin.abs())))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn direction(theta_max: f64) -> impl Strategy<Value = DVec3> {
+        (0.0..theta_max, -PI..PI).prop_map(|(theta, phi)| Spherical { theta, phi }.direction())
+    }
+
+    /// Difference of two azimuths, the short way round.
+    fn turn(a: f64, b: f64) -> f64 {
+        let turn = (a - b).rem_euclid(2.0 * PI);
+        turn.min(2.0 * PI - turn)
+    }
+
+    proptest! {
+        #[test]
+        fn prop_pdv_to_directions_and_back(theta_r in 0.0..1.5_f64, d_p in 1e-3..2.0_f64, phi_p in -PI..PI) {
+            let pdv = Pdv { theta_r, d_p, phi_p };
+            let Some((incident, exitant)) = pdv.directions() else { return Err(TestCaseError::reject("off the disk")) };
+            let back = Pdv::from_directions(incident, exitant).expect("above the horizon");
+            prop_assert!((back.theta_r - theta_r).abs() < 1e-12, "{:?}", back);
+            prop_assert!((back.d_p - d_p).abs() < 1e-12, "{:?}", back);
+            prop_assert!(turn(back.phi_p, phi_p) < 1e-12, "{:?}", back);
+
+            let (incident, exitant) = pdv.angles().expect("on the disk");
+            let back = Pdv::from_angles(incident, exitant).expect("above the horizon");
+            prop_assert!((back.theta_r - theta_r).abs() < 1e-12, "{:?}", back);
+            prop_assert!((back.d_p - d_p).abs() < 1e-12, "{:?}", back);
+            prop_assert!(turn(back.phi_p, phi_p) < 1e-12, "{:?}", back);
+        }
+
+        /// Towards d_p = 0 the length keeps its absolute precision, the azimuth loses as 1/d_p.
+        #[test]
+        fn prop_loss_near_the_mirror_direction(theta_r in 0.0..1.5_f64, log in -12.0..-3.0_f64, phi_p in -PI..PI) {
+            let d_p = 10.0_f64.powf(log);
+            let (incident, exitant) = Pdv { theta_r, d_p, phi_p }.directions().expect("near the mirror direction");
+            let back = Pdv::from_directions(incident, exitant).expect("above the horizon");
+            prop_assert!((back.d_p - d_p).abs() < 1e-15, "{:?}", back);
+            prop_assert!(turn(back.phi_p, phi_p) < 1e-15 / d_p, "{:?}", back);
+        }
+
+        /// The other way round: θ_i loses as 1/cos θ_i towards the rim, where the projection flattens.
+        #[test]
+        fn prop_directions_to_pdv_and_back(
+            log in -7.5..0.0_f64, phi in -PI..PI, exitant in direction(FRAC_PI_2),
+        ) {
+            let theta = FRAC_PI_2 - 10.0_f64.powf(log).min(FRAC_PI_2);
+            let incident = Spherical { theta, phi }.direction();
+            let pdv = Pdv::from_directions(incident, exitant).expect("above the horizon");
+            let (i, o) = pdv.angles().expect("it comes from directions");
+            prop_assert!((i.theta - theta).abs() < 1e-15 / theta.cos(), "{:?} instead of {}", i, theta);
+            let view = Spherical::from_direction(exitant);
+            prop_assert!((o.theta - view.theta).abs() < 1e-15, "{:?}", o);
+            prop_assert!(turn(i.phi, phi - view.phi) < 4e-15 / theta.sin(), "{:?}", i);
+        }
+
+        #[test]
+        fn prop_angles_and_vectors_agree(incident in direction(1.57), exitant in direction(1.57)) {
+            let by_vectors = Pdv::from_directions(incident, exitant).expect("above the horizon");
+            let by_angles =
+                Pdv::from_angles(Spherical::from_direction(incident), Spherical::from_direction(exitant))
+                    .expect("above the horizon");
+            prop_assert!((by_vectors.d_p - by_angles.d_p).abs() < 1e-14);
+            prop_assert!(turn(by_vectors.phi_p, by_angles.phi_p) * by_vectors.d_p < 1e-14);
+        }
+
+        #[test]
+        fn prop_d_p_is_reciprocal_and_tells_the_half_angle(incident in direction(1.5), exitant in direction(1.5)) {
+            let there = Pdv::from_directions(incident, exitant).expect("above the horizon");
+            let back = Pdv::from_directions(exitant, incident).expect("above the horizon");
+            prop_assert!((there.d_p - back.d_p).abs() < 1e-15);
+            let half = brdf::HalfDifference::from_directions(incident, exitant);
+            let tangent = there.d_p / (incident.z + exitant.z);
+            prop_assert!((tangent.atan() - half.theta_h).abs() < 1e-14);
+        }
+
+        #[test]
+        fn prop_nothing_panics(numbers in prop::array::uniform6(prop::num::f64::ANY)) {
+            let [a, b, c, d, e, f] = numbers;
+            let _ = Pdv { theta_r: a, d_p: b, phi_p: c }.directions();
+            let _ = Pdv { theta_r: a, d_p: b, phi_p: c }.angles();
+            let _ = Pdv::from_directions(DVec3::new(a, b, c), DVec3::new(d, e, f));
+            let _ = Pdv::from_angles(Spherical { theta: a, phi: b }, Spherical { theta: c, phi: d });
+            let _ = light_angle(e, f);
+        }
+    }
+
+    /// Where the paper's Algorithm 2 divides by cos φ_i = 0.
+    #[test]
+    fn the_light_beside_the_plane_is_exact() {
+        for side in [FRAC_PI_2, -FRAC_PI_2] {
+            let light = Spherical {
+                theta: 0.6,
+                phi: side,
+            };
+            let pdv = Pdv::from_angles(light, Spherical { theta: 0.4, phi: 0.0 }).unwrap();
+            let (back, _) = pdv.angles().unwrap();
+            assert!(
+                (back.theta - 0.6).abs() < 1e-15 && (back.phi - side).abs() < 1e-15,
+                "{back:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_normal_and_the_rim_are_exact() {
+        let normal = Pdv::from_directions(DVec3::Z, DVec3::Z).unwrap();
+        assert_eq!(
+            normal,
+            Pdv {
+                theta_r: 0.0,
+                d_p: 0.0,
+                phi_p: 0.0
+            }
+        );
+        assert_eq!(normal.directions(), Some((DVec3::Z, DVec3::Z)));
+        // Both at the horizon: mirror direction, and retro with the largest d_p there is.
+        let mirror = Pdv::from_directions(DVec3::NEG_X, DVec3::X).unwrap();
+        assert_eq!((mirror.theta_r, mirror.d_p), (FRAC_PI_2, 0.0));
+        let retro = Pdv::from_directions(DVec3::X, DVec3::X).unwrap();
+        assert_eq!((retro.d_p, retro.phi_p), (2.0, 0.0));
+        let (incident, _) = retro.angles().unwrap();
+        assert_eq!(
+            incident,
+            Spherical {
+                theta: FRAC_PI_2,
+                phi: 0.0
+            }
+        );
+        for n in 0..360 {
+            let light = Spherical {
+                theta: FRAC_PI_2,
+                phi: f64::from(n).to_radians(),
+            };
+            let pdv = Pdv::from_angles(light, Spherical { theta: 0.7, phi: 0.0 }).unwrap();
+            let (back, _) = pdv.angles().expect("the rim belongs to the disk");
+            assert!((back.theta - FRAC_PI_2).abs() < 1e-7, "{n}°: {back:?}");
+        }
+    }
+
+    #[test]
+    fn beyond_the_disk_there_is_nothing() {
+        let at = |theta_r, d_p, phi_p| Pdv { theta_r, d_p, phi_p }.directions();
+        assert_eq!(at(0.5, 1.9, 0.0), None);
+        assert_eq!(at(0.5, 0.6, PI), None, "outwards there is only 1 − sin θ_r");
+        assert_eq!(at(1.6, 0.1, 0.0), None);
+        assert_eq!(at(0.5, -0.1, 0.0), None);
+        assert_eq!(at(0.5, f64::NAN, 0.0), None);
+        assert_eq!(Pdv::from_directions(DVec3::NEG_Z, DVec3::Z), None);
+        assert_eq!(light_angle(0.5, 1.6), None);
+    }
+
+    #[test]
+    fn in_the_plane_the_sign_tells_the_side() {
+        let theta_r = 0.9_f64;
+        for deviation in [-0.2, 0.0, 0.5, 1.5] {
+            let alpha = light_angle(theta_r, deviation).unwrap();
+            let (incident, exitant) = Pdv::in_plane(theta_r, deviation).directions().unwrap();
+            assert!(
+                (incident - DVec3::new(alpha.sin(), 0.0, alpha.cos())).length() < 1e-15,
+                "{deviation}"
+            );
+            assert!((incident.x + exitant.x - deviation).abs() < 1e-15, "{deviation}");
+        }
+    }
+}

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use crate::{Density, light_angle};
 
 /// Bin whose E is the cap of [`Distribution::Capped`]: d_p = 0.01, the width of the narrowest lobe that an aperture
-/// of half a degree lets through at 70°. Denser readings than there would tell nothing new.
+/// of half a degree lets through at 70°. Denser readings than there would tell nothing new. Where that would still put
+/// readings closer than the spacing, the cap goes on to the first bin that does not.
 const CAP_BIN: usize = 10;
 /// Share of the readings that [`Distribution::Capped`] spreads evenly, so that the flat part of a BRDF is not left
 /// to interpolation alone.
@@ -60,7 +61,11 @@ pub fn spread(
             merged: readings,
         };
     }
-    let pieces = pieces(distribution, &ranges);
+    let pieces = match distribution {
+        Distribution::Capped => capped(&ranges, sin, readings as f64 * spacing_rad),
+        Distribution::Paper => pieces(&ranges, f64::INFINITY, 0.0),
+        Distribution::Uniform => pieces(&ranges, 0.0, 1.0),
+    };
     let mut kept = Kept {
         theta_r,
         spacing_rad,
@@ -150,24 +155,32 @@ impl Piece {
     }
 }
 
-fn pieces(distribution: Distribution, ranges: &[(f64, f64)]) -> Vec<Piece> {
+/// The capped density. `taken_rad` is the arm's way that the readings take where they are as close as they may be.
+fn capped(ranges: &[(f64, f64)], sin_r: f64, taken_rad: f64) -> Vec<Piece> {
     let bins = Density::stored().bins();
-    let cap = match distribution {
-        Distribution::Capped => bins[CAP_BIN],
-        Distribution::Paper => f64::INFINITY,
-        Distribution::Uniform => 0.0,
-    };
+    let at = |bin: usize| pieces(ranges, bins[bin], UNIFORM_SHARE);
+    // dD = cos α dα; a few per cent to spare, for either side gets a whole number of readings.
+    let cos = |deviation: f64| (1.0 - (deviation - sin_r).powi(2)).max(0.0).sqrt();
+    let way = |piece: &Piece| 1.05 * taken_rad * cos(piece.low).max(cos(piece.high));
+    let crowds = |pieces: &[Piece]| pieces.iter().any(|piece| piece.density * way(piece) > 1.0);
+    // E falls with d_p, and with it the density at the mirror direction; a few per cent at a time.
+    let mut bin = CAP_BIN;
+    let mut pieces = at(bin);
+    while crowds(&pieces) && bin < Density::BINS / 2 {
+        bin += 1 + bin / 32;
+        pieces = at(bin);
+    }
+    pieces
+}
+
+/// The ranges with the density min(E, cap) mixed with a uniform share, of mass 1.
+fn pieces(ranges: &[(f64, f64)], cap: f64, share: f64) -> Vec<Piece> {
     let mut pieces: Vec<Piece> = ranges
         .iter()
         .flat_map(|&(low, high)| bin_pieces(low, high, cap))
         .collect();
     let length: f64 = ranges.iter().map(|(low, high)| high - low).sum();
     let mass: f64 = pieces.iter().map(Piece::mass).sum();
-    let share = match distribution {
-        Distribution::Capped => UNIFORM_SHARE,
-        Distribution::Paper => 0.0,
-        Distribution::Uniform => 1.0,
-    };
     for piece in &mut pieces {
         let shaped = if mass > 0.0 { piece.density / mass } else { 0.0 };
         piece.density = (1.0 - share) * shaped + share / length.max(f64::MIN_POSITIVE);
@@ -229,6 +242,12 @@ mod tests {
         assert_eq!(seventy(Distribution::Capped, 90).merged, 0);
         assert_eq!(seventy(Distribution::Uniform, 90).merged, 0);
         assert_eq!(seventy(Distribution::Capped, 90).deviations.len(), 90);
+        // On one side alone the cap has to give way.
+        let (theta_r, one_side) = (1.2_f64, 0.0..=1.9);
+        assert_eq!(
+            spread(Distribution::Capped, theta_r, &[one_side], 180, COUNT_RAD).merged,
+            0
+        );
     }
 
     #[test]
