@@ -1,6 +1,6 @@
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// Measures how a flat specimen reflects light, with two servo arms and a photometer.
 ///
@@ -53,6 +53,26 @@ pub(crate) enum Command {
         #[command(flatten)]
         output: Output,
     },
+    /// Write the result of a run in one format to a file, or to stdout.
+    Export {
+        /// The run directory.
+        run: PathBuf,
+        /// What to write.
+        #[arg(long)]
+        format: Format,
+        /// Where to; stdout unless given.
+        #[arg(long, value_name = "FILE")]
+        to: Option<PathBuf>,
+    },
+    /// Compare two BRDFs: every error metric.
+    Eval {
+        /// The truth: a MERL file, a fitted MERL material, "lambert:ALBEDO" or "mirror:REFLECTANCE".
+        truth: String,
+        /// The estimate, likewise.
+        estimate: String,
+        #[command(flatten)]
+        output: Output,
+    },
 }
 
 /// Which rig.
@@ -69,4 +89,15 @@ pub(crate) struct Output {
     /// Print JSON for machines.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// What `export` writes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Format {
+    /// The reconstruction as a MERL table, brdf.binary.
+    Merl,
+    /// The slice over θ_r and d_p, slice.exr.
+    Exr,
+    /// The readings, readings.csv.
+    Csv,
 }

@@ -3,7 +3,9 @@
 //! Data goes to stdout, talk to stderr; the exit code says how it ended.
 
 mod cli;
+mod eval;
 mod exit;
+mod export;
 mod plan;
 mod ports;
 mod print;
@@ -56,6 +58,12 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             };
             return run::run(&task, output.json);
         }
+        Command::Export { run, format, to } => export::export(&run, format, to.as_deref())?,
+        Command::Eval {
+            truth,
+            estimate,
+            output,
+        } => eval::eval(&truth, &estimate, output.json)?,
         Command::Reconstruct { run, output } => reconstruct::reconstruct(run, output.json)?,
     }
     Ok(ExitCode::SUCCESS)

@@ -8,7 +8,7 @@ use serde_json::json;
 use tokio::sync::watch;
 
 use crate::progress::{Progress, clock};
-use crate::{exit, print};
+use crate::{eval, exit, print};
 
 /// What `run` is to do.
 pub(crate) enum Task<'a> {
@@ -99,6 +99,7 @@ fn summary(ended: &Ended, wall_s: f64) -> serde_json::Value {
         "readings": run.readings,
         "retries": run.retries,
         "flags": run.flags,
+        "errors": ended.report.errors,
     })
 }
 
@@ -120,6 +121,12 @@ fn say(ended: &Ended, wall_s: f64) {
         "readings  {} taken, {} of {} steps done, {} retries on the bus",
         run.readings.taken, run.readings.accepted, run.readings.planned, run.retries
     ));
+    if let Some(errors) = &ended.report.errors {
+        print::say("errors against the simulated specimen");
+        for line in eval::lines(errors) {
+            print::say(line);
+        }
+    }
     if ended.outcome != Outcome::Done {
         print::say(format_args!(
             "go on with: gonioctl run --resume {}",

@@ -8,6 +8,8 @@ pub enum Verdict {
     Good,
     /// Worth a look before the result is used.
     Look,
+    /// The readings do not allow the check.
+    Unknown,
 }
 
 /// One consistency check, in words and as numbers.

@@ -1,18 +1,31 @@
 //! A journal becomes a run directory: readings, factors, BRDF, pictures, checks.
+//!
+//! Everything but the journal is derived from it, written under a temporary name and renamed, and can be made again
+//! with [`reconstruct`]. The crate knows nothing of buses, of motion, or of how a run came about.
 
 mod check;
 mod checks;
+mod derive;
 mod directory;
 mod error;
-mod observation;
+mod figures;
+mod measurement;
+mod outline;
+mod page;
+mod picture;
+mod plot;
+mod preview;
 mod readings;
 mod report;
 mod run;
+mod slice;
 
 pub use check::{Check, Verdict};
 pub use directory::RunDirectory;
 pub use error::{ReportError, is_full};
-pub use observation::{Observation, observe};
+pub use measurement::{Measurement, measurements, observations};
+pub use picture::Picture;
+pub use preview::sphere;
 pub use readings::write_readings;
 pub use report::{Report, reconstruct, write};
 pub use run::{Given, Readings, Run, Seconds, State};

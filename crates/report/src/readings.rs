@@ -2,7 +2,7 @@ use std::io;
 
 use serde::Serialize;
 
-use crate::Observation;
+use crate::Measurement;
 use crate::run::flag_name;
 
 /// One row of readings.csv. The order of the columns is fixed; new ones come at the end.
@@ -35,13 +35,9 @@ struct Row {
 }
 
 impl Row {
-    fn new(index: usize, observation: &Observation) -> Self {
-        let Observation {
-            reading,
-            pdv,
-            reflectance,
-            time_s,
-        } = observation;
+    fn new(index: usize, measurement: &Measurement) -> Self {
+        let reading = &measurement.reading;
+        let (pdv, rgb) = (measurement.pdv(), measurement.rgb());
         let flags: Vec<&str> = reading.flags.iter().map(|&flag| flag_name(flag)).collect();
         Self {
             index,
@@ -59,10 +55,10 @@ impl Row {
             counts_monitor: reading.counts.monitor,
             gain: reading.counts.exposure.gain.into(),
             integration_us: reading.counts.exposure.integration_us,
-            time_s: *time_s,
-            f_r: reflectance.map(|f| f.x),
-            f_g: reflectance.map(|f| f.y),
-            f_b: reflectance.map(|f| f.z),
+            time_s: measurement.time_s,
+            f_r: rgb.map(|f| f.x),
+            f_g: rgb.map(|f| f.y),
+            f_b: rgb.map(|f| f.z),
             flags: flags.join("|"),
             step: reading.step,
             attempt: reading.attempt,
@@ -77,10 +73,10 @@ impl Row {
 ///
 /// # Errors
 /// The medium refused.
-pub fn write_readings(observations: &[Observation], out: impl io::Write) -> io::Result<()> {
+pub fn write_readings(measurements: &[Measurement], out: impl io::Write) -> io::Result<()> {
     let mut writer = csv::Writer::from_writer(out);
-    for (index, observation) in observations.iter().enumerate() {
-        writer.serialize(Row::new(index, observation))?;
+    for (index, measurement) in measurements.iter().enumerate() {
+        writer.serialize(Row::new(index, measurement))?;
     }
     writer.flush()
 }

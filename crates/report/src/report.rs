@@ -1,9 +1,16 @@
+use std::io::{self, Write};
+
+use brdf::{Brdf, MerlTable};
 use capture::{FileJournal, Record};
+use pdv::{Comparison, Draw, Model, compare};
 use rig::RigFile;
 use serde::Serialize;
 use sweep::{Job, LeftOut};
 
-use crate::{Check, ReportError, Run, RunDirectory, checks, write_readings};
+use crate::derive::{Sweeps, truth};
+use crate::{
+    Check, ReportError, Run, RunDirectory, checks, measurements, outline, preview, slice, write_readings,
+};
 
 /// report.json: how far the result can be trusted.
 #[derive(Clone, Debug, Serialize)]
@@ -15,6 +22,10 @@ pub struct Report {
     pub run: Run,
     /// Consistency checks.
     pub checks: Vec<Check>,
+    /// Errors against the truth, where the built-in simulator knows it.
+    pub errors: Option<Comparison>,
+    /// Why there is no reconstruction, where there is none.
+    pub no_model: Option<String>,
     /// What the plan left out and why.
     pub left_out: Vec<LeftOut>,
 }
@@ -27,8 +38,8 @@ pub fn reconstruct(directory: &RunDirectory) -> Result<Report, ReportError> {
     write(directory, &FileJournal::read(directory.journal())?)
 }
 
-/// Writes everything that follows from the records of a journal into its run directory. As long as there are too few
-/// readings for a BRDF, only what can be said without one.
+/// Writes everything that follows from the records of a journal into its run directory. A run that is not complete
+/// gets no BRDF, only what can be said without one.
 ///
 /// # Errors
 /// Records without a header; a job or rig file that this version does not accept; a file that cannot be written.
@@ -41,17 +52,87 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
     let job = Job::parse(&header.job, "job file").map_err(ReportError::Job)?;
     let rig = RigFile::parse(&header.rig, "rig file".as_ref()).map_err(ReportError::Rig)?;
     let run = Run::new(header, records);
-    let observations = crate::observe(records, &rig);
-    directory.write("run.json", |file| Ok(serde_json::to_writer_pretty(file, &run)?))?;
-    directory.write("readings.csv", |file| write_readings(&observations, file))?;
+    let measurements = measurements(records, &rig);
+    directory.write("run.json", |file| json(file, &run))?;
+    directory.write("readings.csv", |file| write_readings(&measurements, file))?;
+
+    let sweeps = Sweeps::new(&job, &measurements);
+    let model = if run.complete() {
+        sweeps.model(&job).map_err(|error| error.to_string())
+    } else {
+        Err("the run is not complete".to_owned())
+    };
+    let truth = truth(&rig);
+    let (model, no_model) = match model {
+        Ok(model) => (Some(model), None),
+        Err(why) => (None, Some(why)),
+    };
+    if let Some(model) = &model {
+        write_model(directory, model.as_ref())?;
+    }
+    let errors = model.as_ref().zip(truth.as_ref()).map(|(model, truth)| {
+        let estimate: &dyn Brdf = model.as_ref();
+        compare(truth, &[estimate], &Draw::default()).remove(0)
+    });
     let report = Report {
         specimen: job.specimen.clone(),
-        checks: vec![checks::bus(&run)],
+        checks: check(&run, &job, &sweeps, model.as_deref()),
+        errors,
+        no_model,
         left_out: header.plan.left_out.clone(),
         run,
     };
-    directory.write("report.json", |file| {
-        Ok(serde_json::to_writer_pretty(file, &report)?)
-    })?;
+    directory.write("report.json", |file| json(file, &report))?;
+    let page = outline::page(&report, &job, &sweeps, model.as_deref(), truth.as_deref());
+    directory.write("report.html", |file| file.write_all(page.html().as_bytes()))?;
     Ok(report)
+}
+
+/// factors.csv, brdf.binary, slice.exr, preview.exr and preview.png.
+fn write_model(directory: &RunDirectory, model: &dyn Model) -> Result<(), ReportError> {
+    directory.write("factors.csv", |file| write_factors(model, file))?;
+    directory.write("brdf.binary", |file| MerlTable::fill(model).write_to(file))?;
+    directory.write("slice.exr", |file| slice::write(model, file))?;
+    let sphere = preview::sphere(model);
+    directory.write("preview.exr", |file| sphere.write_exr(file, &preview::ATTRIBUTES))?;
+    directory.write("preview.png", |file| {
+        file.write_all(&sphere.png(preview::EXPOSURE)?)
+    })
+}
+
+/// One row a node: factor, its variable with the unit, the variable, red, green, blue.
+fn write_factors(model: &dyn Model, out: impl Write) -> io::Result<()> {
+    let mut writer = csv::Writer::from_writer(out);
+    writer.write_record(["factor", "variable", "value", "r", "g", "b"])?;
+    for table in model.factors() {
+        for (value, rgb) in &table.rows {
+            writer.serialize((table.name, table.variable, value, rgb.x, rgb.y, rgb.z))?;
+        }
+    }
+    writer.flush()
+}
+
+fn check(run: &Run, job: &Job, sweeps: &Sweeps, model: Option<&dyn Model>) -> Vec<Check> {
+    let mut checks = vec![checks::bus(run)];
+    for (plane, observations) in job.planes.iter().zip(&sweeps.planes) {
+        if let Some(arc) = &job.arc {
+            checks.push(checks::crossing(
+                observations,
+                &sweeps.arc,
+                plane.theta_r,
+                arc.offset,
+            ));
+        }
+        checks.push(checks::sides(observations, plane.theta_r));
+    }
+    if let Some(model) = model {
+        checks.push(checks::coverage(model));
+        checks.push(checks::energy(model));
+    }
+    checks
+}
+
+fn json(mut file: impl Write, value: &impl Serialize) -> io::Result<()> {
+    serde_json::to_writer_pretty(&mut file, value)?;
+    file.write_all(b"\n")
 }

@@ -115,6 +115,8 @@ pub struct Readings {
     pub taken: usize,
     /// Those that count for their step.
     pub accepted: usize,
+    /// Those that count although a channel is saturated or has too few counts.
+    pub poor: usize,
 }
 
 impl Run {
@@ -156,6 +158,11 @@ impl Run {
         run
     }
 
+    /// Whether every step of the plan has an accepted reading.
+    pub fn complete(&self) -> bool {
+        self.readings.accepted >= self.readings.planned
+    }
+
     fn begun(header: &Header) -> Self {
         Self {
             id: header.run.clone(),
@@ -182,6 +189,8 @@ impl Run {
     fn count(&mut self, reading: &Reading) {
         self.readings.taken += 1;
         self.readings.accepted += usize::from(reading.accepted);
+        let poor = |flag: &Flag| matches!(flag, Flag::Saturated | Flag::Dim);
+        self.readings.poor += usize::from(reading.accepted && reading.flags.iter().any(poor));
         self.retries += u64::from(reading.retries);
         for &flag in &reading.flags {
             *self.flags.entry(flag_name(flag)).or_default() += 1;

@@ -1,0 +1,148 @@
+use brdf::Brdf;
+use pdv::{Metrics, Model};
+use sweep::Job;
+
+use crate::derive::Sweeps;
+use crate::page::Page;
+use crate::run::State;
+use crate::{Report, figures, preview};
+
+/// What report.html shows of a run.
+pub(crate) fn page<'a>(
+    report: &'a Report,
+    job: &Job,
+    sweeps: &Sweeps,
+    model: Option<&dyn Model>,
+    truth: Option<&dyn Brdf>,
+) -> Page<'a> {
+    let mut pictures = Vec::new();
+    let spheres: [(&str, Option<&dyn Brdf>); 2] = [
+        ("As reconstructed", model.map(|model| model as &dyn Brdf)),
+        ("The simulated specimen itself", model.and(truth)),
+    ];
+    for (caption, material) in spheres {
+        // A picture that cannot be encoded is no reason to have no report.
+        let png = material.and_then(|material| preview::sphere(material).png(preview::EXPOSURE).ok());
+        pictures.extend(png.map(|png| (caption, png)));
+    }
+    let mut plots = Vec::new();
+    for (plane, observations) in job.planes.iter().zip(&sweeps.planes) {
+        plots.push((
+            "G: dots towards the normal, rings outwards, lines the model. Both axes logarithmic.",
+            figures::plane(plane.theta_r, observations, model),
+        ));
+    }
+    if let Some(arc) = &job.arc {
+        plots.push((
+            "F: the mirror arc, dots as measured, lines the model.",
+            figures::arc(arc.offset, &sweeps.arc, model),
+        ));
+    }
+    let mut tables = Vec::new();
+    if let Some(errors) = &report.errors {
+        let columns = [
+            errors.overall,
+            errors.channels.r,
+            errors.channels.g,
+            errors.channels.b,
+        ];
+        tables.push(("Errors against the simulated specimen", error_table(&columns)));
+    }
+    if !report.left_out.is_empty() {
+        tables.push(("Left out of the plan", left_out_table(report)));
+    }
+    Page {
+        title: title(report),
+        facts: facts(report),
+        pictures,
+        checks: &report.checks,
+        plots,
+        tables,
+        notes: notes(report),
+    }
+}
+
+fn title(report: &Report) -> &str {
+    match report.specimen.as_str() {
+        "" => "Unnamed specimen",
+        specimen => specimen,
+    }
+}
+
+fn facts(report: &Report) -> Vec<(&'static str, String)> {
+    let run = &report.run;
+    let state = match (run.state, &run.fault) {
+        (State::Done, _) => "done".to_owned(),
+        (State::Failed, Some(fault)) => format!("failed: {fault}"),
+        (State::Failed, None) => "failed".to_owned(),
+        (State::Stopped, _) => "stopped before the end".to_owned(),
+        (State::Interrupted, _) => "interrupted".to_owned(),
+    };
+    let devices: Vec<String> = run
+        .identities
+        .iter()
+        .map(|device| {
+            format!(
+                "{} (id {}, firmware {})",
+                device.model, device.id, device.firmware
+            )
+        })
+        .collect();
+    vec![
+        ("State", state),
+        ("Run", run.id.clone()),
+        ("Began", run.started.clone()),
+        ("Rig time", format!("{:.1} s", run.seconds.total)),
+        (
+            "Readings",
+            format!(
+                "{} for {} of {} steps",
+                run.readings.taken, run.readings.accepted, run.readings.planned
+            ),
+        ),
+        ("Devices", devices.join(", ")),
+        ("Program", format!("goniod {}", run.version)),
+    ]
+}
+
+fn notes(report: &Report) -> Vec<String> {
+    let mut notes: Vec<String> = report
+        .no_model
+        .iter()
+        .map(|why| format!("There is no reconstruction: {why}."))
+        .collect();
+    notes.push(
+        "The pictures show a sphere lit by two lamps; each channel c is shown as 1 − exp(−1.57 c) through the sRGB curve. preview.exr holds the values themselves.".to_owned(),
+    );
+    notes
+}
+
+fn error_table(columns: &[Metrics; 4]) -> Vec<Vec<String>> {
+    type Pick = fn(&Metrics) -> Option<f64>;
+    let rows: [(&str, Pick); 7] = [
+        ("MALE", |m| m.male),
+        ("median relative error", |m| m.median_rel),
+        ("95th percentile of it", |m| m.p95_rel),
+        ("relative RMS", |m| m.rel_rms),
+        ("log-relative RMSE", |m| m.log_rel_rmse),
+        ("Eq. 4", |m| m.eq4),
+        ("Eq. 4 of black", |m| m.eq4_black),
+    ];
+    let head = ["", "all", "red", "green", "blue"].map(str::to_owned).to_vec();
+    let mut table = vec![head];
+    for (name, pick) in rows {
+        let cells = columns
+            .iter()
+            .map(|m| pick(m).map_or("–".to_owned(), |v| format!("{v:.4}")));
+        table.push(std::iter::once(name.to_owned()).chain(cells).collect());
+    }
+    table
+}
+
+fn left_out_table(report: &Report) -> Vec<Vec<String>> {
+    let head = ["what", "readings", "why"].map(str::to_owned).to_vec();
+    let rows = report.left_out.iter();
+    std::iter::once(head)
+        .chain(rows.map(|l| vec![l.what.clone(), l.readings.to_string(), l.why.clone()]))
+        .collect()
+}
