@@ -13,7 +13,7 @@ use crate::{
 
 /// Most exposures of one reading in one execution: from one end of the range to the other takes six, by a factor of
 /// about 16 each.
-const MAX_EXPOSURES: u32 = 8;
+pub(crate) const MAX_EXPOSURES: u32 = 8;
 /// Longest time for which an operator's command is not looked at, and between two looks at a paused rig; well below
 /// the watchdogs.
 const LOOK: Duration = Duration::from_millis(200);
@@ -60,6 +60,8 @@ pub(crate) struct Execution<'a, R: Rig> {
     /// Device time at the end of the last step.
     mark: u64,
     lamp: bool,
+    /// Whether a device was told anything: until each has said who it is, none is.
+    touched: bool,
     /// Whether the arms stand where the plan left them, so that a step's own path leads on.
     on_path: bool,
 }
@@ -102,6 +104,7 @@ impl<'a, R: Rig> Execution<'a, R> {
             clock: DeviceClock::default(),
             mark: 0,
             lamp: false,
+            touched: false,
             on_path: false,
         }
     }
@@ -111,6 +114,7 @@ impl<'a, R: Rig> Execution<'a, R> {
         self.state(State::Identifying);
         self.begin().await?;
         self.state(State::Engaging);
+        self.touched = true;
         self.drive.engage_all().await?;
         self.state(State::Running);
         self.report_progress();
@@ -301,9 +305,9 @@ impl<'a, R: Rig> Execution<'a, R> {
         mut self,
         result: Result<(), Interrupt<R::Error>>,
     ) -> Result<Outcome, CaptureError> {
-        self.state(State::ShuttingDown);
         let at_rest = matches!(result, Ok(()) | Err(Interrupt::Stop));
         let unsafe_left = match result {
+            _ if !self.touched => Vec::new(),
             _ if at_rest => self.drive.disengage_all().await,
             Err(Interrupt::Estop) => {
                 let mut failed = self.drive.halt_all().await;
@@ -330,7 +334,7 @@ impl<'a, R: Rig> Execution<'a, R> {
                 fault: format!("could not shut down: {}", chain(error)),
             };
         }
-        let device_ticks = match unsafe_left.is_empty() {
+        let device_ticks = match self.touched && unsafe_left.is_empty() {
             true => self.drive.ticks().await.ok(),
             false => None,
         };
@@ -351,6 +355,9 @@ impl<'a, R: Rig> Execution<'a, R> {
     }
 
     async fn stop(&mut self) -> Vec<DriveError<R::Error>> {
+        if !self.touched {
+            return Vec::new();
+        }
         let mut failed = self.drive.stop_all().await;
         failed.extend(self.drive.disengage_all().await);
         failed
@@ -360,7 +367,7 @@ impl<'a, R: Rig> Execution<'a, R> {
         (self.on_event)(event);
     }
 
-    fn state(&mut self, state: State) {
+    pub(crate) fn state(&mut self, state: State) {
         self.emit(Event::State { state });
     }
 

@@ -8,6 +8,8 @@ use crate::Reading;
 const BEYOND_FULL_SCALE: f64 = 8.0;
 /// Most by which the trend of the last two readings may raise a prediction.
 const STEEPEST: f64 = 8.0;
+/// Share of full scale that no exposure may be expected to exceed.
+const ALMOST_FULL: f64 = 0.95;
 /// An exposure that differs less than this from the last one is not worth another reading.
 const WORTH_IT: f64 = 1.1;
 
@@ -130,21 +132,23 @@ impl<'a> Ranging<'a> {
         Some(last_rate * growth.exp())
     }
 
-    /// The exposure that brings a rate to the aim.
+    /// The exposure that brings a rate to the aim, or as near as the range of the photometer allows without
+    /// saturating.
     fn aim(&self, rate: f64) -> Exposure {
         let p = self.photometer;
-        let counts = p.aim * f64::from(p.full_scale);
-        let needed = |gain: Gain| counts / (rate * gain.factor());
-        let longest = f64::from(p.integration_max_us);
-        let gain = Gain::ALL
-            .into_iter()
-            .find(|&gain| needed(gain) <= longest)
-            .unwrap_or(Gain::X256);
-        let shortest = f64::from(p.integration_min_us);
-        Exposure {
+        let full = f64::from(p.full_scale);
+        let [shortest, longest] = [p.integration_min_us, p.integration_max_us].map(f64::from);
+        let needed = |gain: Gain| p.aim * full / (rate * gain.factor());
+        let at = |gain: Gain| Exposure {
             integration_us: needed(gain).clamp(shortest, longest).round() as u32,
             gain,
-        }
+        };
+        let fits = |gain: &Gain| rate * sensitivity(at(*gain)) <= ALMOST_FULL * full;
+        let reaches = |gain: &Gain| needed(*gain) <= longest;
+        // Where the range of times is narrower than the steps of gain, the gain that reaches the aim may saturate.
+        let gain = Gain::ALL.into_iter().find(|gain| reaches(gain) && fits(gain));
+        let strongest = || Gain::ALL.into_iter().rev().find(fits);
+        at(gain.or_else(strongest).unwrap_or(Gain::X1))
     }
 }
 
@@ -157,4 +161,171 @@ fn geometric_middle(p: &PhotometerSettings) -> u32 {
     (f64::from(p.integration_min_us) * f64::from(p.integration_max_us))
         .sqrt()
         .round() as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use rig::RigFile;
+
+    use super::*;
+
+    const DARK: f64 = 64.0;
+
+    fn photometer(text: &str) -> PhotometerSettings {
+        let text = format!("[photometer]\n{text}");
+        RigFile::parse(&text, "test.toml".as_ref())
+            .expect("a good rig file")
+            .photometer
+    }
+
+    /// What a photometer without noise says of a light with this rate.
+    fn counts(p: &PhotometerSettings, rate: f64, exposure: Exposure) -> Counts {
+        let full = f64::from(p.full_scale);
+        let raw = (DARK + rate * sensitivity(exposure)).round();
+        Counts {
+            rgb: [raw.min(full) as u32, 0, 0],
+            monitor: 0,
+            exposure,
+            saturated: raw >= full,
+            sequence: 0,
+            ticks: 0,
+            temperature_c: 25,
+        }
+    }
+
+    fn reading(p: &PhotometerSettings, lamp: bool, light_deg: f64, rate: f64, exposure: Exposure) -> Reading {
+        let pose = Pose::from_deg(light_deg, 60.0);
+        Reading {
+            step: 0,
+            attempt: 0,
+            accepted: true,
+            sweep: if lamp { Sweep::Plane(0) } else { Sweep::Dark },
+            lamp,
+            goal: pose,
+            measured: pose,
+            counts: counts(p, rate, exposure),
+            device_ticks: 0,
+            retries: 0,
+            flags: Vec::new(),
+        }
+    }
+
+    fn with_darks(p: &PhotometerSettings) -> Ranging<'_> {
+        let mut ranging = Ranging::new(p);
+        for gain in Gain::ALL {
+            for integration_us in [p.integration_min_us, p.integration_max_us] {
+                ranging.learn(&reading(p, false, 0.0, 0.0, Exposure { integration_us, gain }));
+            }
+        }
+        ranging
+    }
+
+    /// Exposes until there is nothing better, and says how often.
+    fn settle(ranging: &Ranging<'_>, p: &PhotometerSettings, rate: f64, first: Exposure) -> (Counts, usize) {
+        let mut last = counts(p, rate, first);
+        let mut exposures = 1;
+        while let Some(better) = ranging.better(&last) {
+            last = counts(p, rate, better);
+            exposures += 1;
+            assert!(
+                exposures <= 20,
+                "never content with {rate} counts/µs from {first:?}"
+            );
+        }
+        (last, exposures)
+    }
+
+    #[test]
+    fn the_weakest_gain_that_reaches_the_aim_is_used() {
+        let p = photometer("");
+        let ranging = with_darks(&p);
+        let aim = f64::from(p.full_scale) * p.aim;
+        let table = [
+            (aim / 100_000.0, Gain::X1, 100_000),
+            (aim / 100_001.0, Gain::X16, 6250),
+            (aim / 1_600_000.0, Gain::X16, 100_000),
+            (aim / 1_700_000.0, Gain::X256, 6641),
+            (1e-9, Gain::X256, 100_000),
+            (1e9, Gain::X1, 100),
+        ];
+        for (rate, gain, integration_us) in table {
+            assert_eq!(
+                ranging.aim(rate),
+                Exposure { integration_us, gain },
+                "{rate} counts/µs"
+            );
+        }
+    }
+
+    /// On the flank of a lobe each reading is brighter than the last by the same factor.
+    #[test]
+    fn a_steady_rise_is_foreseen_and_a_fall_is_not() {
+        let p = photometer("");
+        for (factor, expected) in [(1.5, 1.5), (0.5, 1.0), (100.0, STEEPEST)] {
+            let mut ranging = with_darks(&p);
+            for (i, light_deg) in [-40.0, -41.0].into_iter().enumerate() {
+                let rate = f64::powi(factor, i as i32);
+                ranging.learn(&reading(&p, true, light_deg, rate, ranging.aim(rate)));
+            }
+            let next = ranging
+                .predict(Sweep::Plane(0), Pose::from_deg(-42.0, 60.0))
+                .expect("known");
+            assert!((next / factor / expected - 1.0).abs() < 1e-2, "{factor}: {next}");
+        }
+    }
+
+    #[test]
+    fn a_sweep_begins_with_what_the_nearest_reading_of_another_said() {
+        let p = photometer("");
+        let mut ranging = with_darks(&p);
+        for (light_deg, rate) in [(-80.0, 0.5), (-20.0, 7.0)] {
+            ranging.learn(&reading(&p, true, light_deg, rate, ranging.aim(rate)));
+        }
+        let expected = ranging.aim(7.0);
+        let first = ranging.first(Sweep::Arc, Pose::from_deg(-30.0, 50.0));
+        assert_eq!(first.gain, expected.gain);
+        assert!(
+            first.integration_us.abs_diff(expected.integration_us) < 10,
+            "{first:?}, {expected:?}"
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn prop_any_light_is_ranged_within_the_bound(
+            log_rate in -6.0..6.0_f64,
+            min_us in 10_u32..5_000,
+            span in 1_u32..2_000,
+            gain in 0_usize..3,
+            start in 0.0..=1.0_f64,
+            aim in 0.05..0.9_f64,
+            enough in 0_u32..1_048_575,
+        ) {
+            let max_us = min_us.saturating_mul(span).min(10_000_000);
+            let p = photometer(&format!(
+                "integration_min_us = {min_us}\nintegration_max_us = {max_us}\naim = {aim}\nenough = {enough}"
+            ));
+            let ranging = with_darks(&p);
+            let integration_us = min_us + (start * f64::from(max_us - min_us)) as u32;
+            let first = Exposure { integration_us, gain: Gain::ALL[gain] };
+            let (last, exposures) = settle(&ranging, &p, 10_f64.powf(log_rate), first);
+            prop_assert!(exposures <= crate::execution::MAX_EXPOSURES as usize, "{exposures} exposures");
+            let exposure = last.exposure;
+            prop_assert!((min_us..=max_us).contains(&exposure.integration_us));
+            if last.saturated {
+                let least = f64::from(exposure.integration_us) <= f64::from(min_us) * WORTH_IT;
+                prop_assert!(exposure.gain == Gain::X1 && least, "{exposure:?} could be had weaker");
+            } else if ranging.dim(&last) {
+                let most = exposure.gain == Gain::X256
+                 && f64::from(exposure.integration_us) * WORTH_IT >= f64::from(max_us);
+             let aim = p.aim * f64::from(p.full_scale);
+             let reached = ranging.net(&last) * WORTH_IT * 1.01 >= aim;
+             // Nothing between too little and too much.
+             let times = f64::from(min_us)..=f64::from(max_us);
+             let gap = !Gain::ALL.into_iter().any(|gain| times.contains(&(aim / (10_f64.powf(log_rate) * gain.factor()))));
+             prop_assert!(most || reached || gap, "{last:?} is dim and could be had better");
+            }
+        }
+    }
 }

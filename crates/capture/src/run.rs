@@ -6,7 +6,7 @@ use rig::{Drive, Rig};
 use tokio::sync::watch;
 
 use crate::execution::{Execution, Interrupt};
-use crate::{CaptureError, Command, Event, Journal, Outcome, Record};
+use crate::{CaptureError, Command, Event, Journal, Outcome, Record, State};
 
 /// Runs the plan in a journal's header on a rig, or goes on with it: steps that have an accepted reading are not
 /// measured again.
@@ -40,11 +40,13 @@ pub async fn run<R: Rig>(
     let file = drive.file().clone();
     let mut execution = Execution::new(&plan, &file, drive, journal, control.clone(), on_event);
     let result = guarded(async {
-        tokio::select! {
+        let result = tokio::select! {
             biased;
             () = estop(control) => Err(Interrupt::Estop),
             result = execution.all() => result,
-        }
+        };
+        execution.state(State::ShuttingDown);
+        result
     })
     .await;
     match result {
