@@ -157,9 +157,7 @@ fn serve(terminal: &Terminal, shared: &Shared, stopped: &PipeReader) -> io::Resu
             }
             Wake::Nothing => {}
         }
-        if due.is_empty() {
-            terminal.clear_exclusive()?;
-        }
+        terminal.clear_exclusive()?;
     }
 }
 
@@ -183,3 +181,6 @@ fn await_bytes(terminal: &Terminal, stopped: &PipeReader, wait: Duration) -> io:
         Ok(_) => Ok(Wake::Bytes),
     }
 }
+
+#[cfg(test)]
+mod tests;
