@@ -18,7 +18,7 @@ struct Arguments {
     /// Give the terminal a stable name too: a symbolic link, removed at exit.
     #[arg(long, value_name = "PATH")]
     link: Option<PathBuf>,
-    /// Rig file; its [sim] table describes what is simulated.
+    /// Rig file; its table "sim" describes what is simulated.
     #[arg(long, value_name = "RIG.toml")]
     config: Option<PathBuf>,
     /// What lies on the stage, instead of what the rig file says: a fitted MERL material by name, "lambert:ALBEDO",

@@ -1,5 +1,8 @@
 //! The simulated bus under a client that nobody here wrote: the crate rustypot over serialport.
 
+// All of it is test code, the functions beside the tests too.
+#![allow(clippy::unwrap_used)]
+
 use std::path::Path;
 use std::time::Duration;
 

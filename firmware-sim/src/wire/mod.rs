@@ -1,6 +1,6 @@
 //! The wire: the device side of Dynamixel Protocol 2.0, from bytes to devices and back.
 //!
-//! Pure up to [`line`]: bytes and times are arguments. [`server`] gives it a pseudo-terminal and a thread.
+//! Pure up to [`mod@line`]: bytes and times are arguments. [`server`] gives it a pseudo-terminal and a thread.
 
 mod answer;
 mod counters;
