@@ -1,3 +1,4 @@
+use std::collections::BTreeSet;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
@@ -13,7 +14,11 @@ use crate::{BusSettings, RigError};
 const RETURN_DELAY_MAX: Duration = Duration::from_micros(508);
 
 /// What a busy host may add to a reply time; the price of a lost reply, so not more than needed.
-const HOST_MARGIN: Duration = Duration::from_millis(10);
+const HOST_MARGIN: Duration = Duration::from_millis(30);
+
+/// No reply comes later than this after its request. ROBOTIS' SDK gives up 34 ms after the last byte is due, and
+/// nobody reports replies that it missed; this is half as much again.
+const LATEST_REPLY: Duration = Duration::from_millis(50);
 
 /// Bytes of an instruction packet besides its parameters: header 4, id, length 2, instruction, CRC 2.
 const INSTRUCTION_OVERHEAD: usize = 10;
@@ -23,6 +28,12 @@ const STATUS_OVERHEAD: usize = 11;
 
 /// Bytes of the packet buffers: several times the longest packet that is sent or asked for.
 const BUFFER: usize = 256;
+
+/// Ping (e-manual, Protocol 2.0).
+const PING: u8 = 0x01;
+
+/// Parameters of the answer to a ping: model number and firmware version. No register block of this length is read.
+const PING_REPLY: usize = 3;
 
 /// One transaction: a packet and the status packets that must follow, in their order.
 #[derive(Debug)]
@@ -73,8 +84,10 @@ pub(super) struct Line {
     lock: TTYPort,
     path: PathBuf,
     settings: BusSettings,
-    /// After a failure nothing is sent before this, so that a late reply is not taken for the next one.
+    /// After a failure nothing is sent before this: a late reply shall not collide with the next request.
     quiet_until: Option<Instant>,
+    /// Ids of which a reply may still be under way.
+    suspects: BTreeSet<u8>,
 }
 
 impl Line {
@@ -91,6 +104,7 @@ impl Line {
             path: path.to_owned(),
             settings: settings.clone(),
             quiet_until: None,
+            suspects: BTreeSet::new(),
         })
     }
 
@@ -103,6 +117,7 @@ impl Line {
             std::thread::sleep(quiet.saturating_duration_since(Instant::now()));
         }
         let first = request.replies.first().map_or(request.id, |&(id, _)| id);
+        let started = Instant::now();
         let result = catch_unwind(AssertUnwindSafe(|| self.attempt(request))).unwrap_or_else(|_| {
             let cause = match bus(&self.lock) {
                 Ok(bus) => {
@@ -115,50 +130,99 @@ impl Line {
         });
         if let Err(Failure { id, cause }) = &result {
             tracing::debug!(id, ?cause, port = %self.path.display(), "transaction failed");
-            if !matches!(cause, Cause::Refusal(_)) {
-                self.quiet_until = Some(Instant::now() + self.reply_time(0, request));
+            if matches!(cause, Cause::Silence | Cause::Damage(_)) {
+                self.suspects.extend(request.replies.iter().map(|&(id, _)| id));
             }
+            self.quiet_until = match cause {
+                Cause::Refusal(_) | Cause::Gone(_) => None,
+                // Something came; the rest of it, or the reply proper, is due by then.
+                Cause::Damage(_) => Some(started + self.reply_time(BUFFER, request)),
+                Cause::Silence => Some(started + self.reply_time(BUFFER, request).max(LATEST_REPLY)),
+            };
         }
         result
     }
 
     fn attempt(&mut self, request: &Request) -> Result<Vec<Reply>, Failure> {
-        let fail = |id: u8, cause: Cause| Failure { id, cause };
+        for &(id, _) in &request.replies {
+            if self.suspects.contains(&id) {
+                self.catch_up(id).map_err(|cause| Failure { id, cause })?;
+                self.suspects.remove(&id);
+            }
+        }
+        let deadline = self.send(request).map_err(|cause| Failure {
+            id: request.id,
+            cause,
+        })?;
+        let mut replies = Vec::with_capacity(request.replies.len());
+        for &(id, count) in &request.replies {
+            let (answered, reply) = self.receive(deadline).map_err(|cause| Failure { id, cause })?;
+            let found = reply.parameters.len();
+            let cause = if answered == id && found == count {
+                replies.push(reply);
+                continue;
+            } else if answered == id {
+                Cause::Damage(format!("it has {found} bytes instead of {count}"))
+            } else if request.replies.iter().any(|&(other, _)| other == answered) {
+                // The next device of a bulk read spoke up: this one has missed its turn.
+                Cause::Silence
+            } else {
+                Cause::Damage(format!("id {answered} answered instead"))
+            };
+            return Err(Failure { id, cause });
+        }
+        Ok(replies)
+    }
+
+    /// Waits for whatever a device may still have to say to an earlier request: it answers in order, so all of that
+    /// comes before its answer to this ping. Nothing else that is asked for has the length of that answer.
+    fn catch_up(&mut self, id: u8) -> Result<(), Cause> {
+        let ping = Request {
+            id,
+            instruction: PING,
+            parameters: Vec::new(),
+            replies: vec![(id, PING_REPLY)],
+        };
+        let deadline = self.send(&ping)?;
+        loop {
+            match self.receive(deadline) {
+                Ok((answered, reply)) if answered == id && reply.parameters.len() == PING_REPLY => {
+                    return Ok(());
+                }
+                Ok(_) | Err(Cause::Refusal(_)) => {}
+                // Not passed over: of a reply that claims to be too long, the crate tells again and again.
+                Err(cause) => return Err(cause),
+            }
+        }
+    }
+
+    /// Throws away what lies in the input buffers, sends a packet and says until when its replies are due.
+    fn send(&mut self, request: &Request) -> Result<Instant, Cause> {
         let parameters = &request.parameters;
-        // Also throws away whatever lies in the input buffers.
         self.bus
             .write_instruction(request.id, request.instruction, parameters.len(), |buffer| {
                 buffer.copy_from_slice(parameters);
             })
-            .map_err(|error| fail(request.id, write_cause(error)))?;
+            .map_err(write_cause)?;
         let sent = INSTRUCTION_OVERHEAD + parameters.len() + stuffing(parameters);
         let deadline = Instant::now() + self.reply_time(sent, request);
         if let Some(echo) = &mut self.echo {
-            skip_echo(echo, sent, deadline).map_err(|error| fail(request.id, io_cause(error)))?;
+            skip_echo(echo, sent, deadline).map_err(io_cause)?;
         }
-        let mut replies = Vec::with_capacity(request.replies.len());
-        for &(id, count) in &request.replies {
-            let status = self
-                .bus
-                .read_status_response_deadline(deadline)
-                .map_err(|error| fail(id, read_cause(error)))?;
-            if status.packet_id() != id {
-                let cause = Cause::Damage(format!("id {} answered instead", status.packet_id()));
-                return Err(fail(id, cause));
-            }
-            if status.parameters().len() != count {
-                let found = status.parameters().len();
-                return Err(fail(
-                    id,
-                    Cause::Damage(format!("it has {found} bytes instead of {count}")),
-                ));
-            }
-            replies.push(Reply {
-                alert: status.alert(),
-                parameters: status.parameters().to_owned(),
-            });
-        }
-        Ok(replies)
+        Ok(deadline)
+    }
+
+    /// The next status packet, and whose it is.
+    fn receive(&mut self, deadline: Instant) -> Result<(u8, Reply), Cause> {
+        let status = self
+            .bus
+            .read_status_response_deadline(deadline)
+            .map_err(read_cause)?;
+        let reply = Reply {
+            alert: status.alert(),
+            parameters: status.parameters().to_owned(),
+        };
+        Ok((status.packet_id(), reply))
     }
 
     /// Longest time until all replies are there: bytes both ways, return delays, adapter, host.
