@@ -1,5 +1,8 @@
 //! Before the first motion: ports, identities, and that nothing moves.
 
+// Set-up outside the test functions, which clippy does not take for tests.
+#![allow(clippy::unwrap_used)]
+
 use std::path::Path;
 use std::time::{Duration, Instant};
 
