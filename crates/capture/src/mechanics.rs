@@ -1,5 +1,5 @@
 use arms::{ArmAngle, Pose};
-use rig::{Approach, RigFile};
+use rig::{Approach, Port, RigFile};
 use sweep::Mechanics;
 
 /// What a planner needs to know of the rig in a rig file, with the arms standing at `start`.
@@ -29,9 +29,18 @@ pub fn mechanics(rig: &RigFile, start: Option<Pose>) -> Mechanics {
     }
 }
 
-/// Bytes and transactions of one reading: start, snapshots until settled, trigger, status, counts.
+/// Expected time on the bus for one reading.
+///
+/// About six snapshots (before, at and after a motion), the start, status, trigger and counts. A real adapter also
+/// holds each answer back for up to its latency, half of that on the average.
 fn transaction_s(rig: &RigFile) -> f64 {
-    const BYTES: f64 = 300.0;
+    /// Measured on the simulated wire.
+    const BYTES: f64 = 630.0;
+    const ANSWERS: f64 = 10.0;
     const BITS_PER_BYTE: f64 = 10.0;
-    BYTES * BITS_PER_BYTE / f64::from(rig.bus.baud)
+    let wire_s = BYTES * BITS_PER_BYTE / f64::from(rig.bus.baud);
+    match rig.bus.port {
+        Port::Sim => wire_s,
+        Port::Path(_) => wire_s + ANSWERS * rig.bus.latency.as_secs_f64() / 2.0,
+    }
 }

@@ -6,7 +6,7 @@ use capture::{
 use firmware_sim::in_process::{InProcessRig, SharedBench};
 use rig::dynamixel::register::{common, photometer, servo};
 use rig::{Device, Drive, Rig, RigFile};
-use sweep::{Job, Plan, plan};
+use sweep::{Job, Mechanics, Plan, plan};
 use tokio::sync::watch;
 
 pub(crate) const SHORT: &str = "[[plane]]\ntheta_r_deg = 60\nreadings = 12\n[arc]\nreadings = 8";
@@ -92,7 +92,12 @@ impl Scene {
         let mut rig = InProcessRig::new(&file).expect("a good [sim] table");
         let start = rig.snapshot().await.expect("all devices answer").pose();
         let job = Job::parse(job, "job.toml").expect("a good job");
-        let plan = plan(&job, &mechanics(&file, Some(start))).expect("possible on this rig");
+        // This rig has no wire.
+        let mechanics = Mechanics {
+            transaction_s: 0.0,
+            ..mechanics(&file, Some(start))
+        };
+        let plan = plan(&job, &mechanics).expect("possible on this rig");
         Self {
             bench: rig.bench(),
             drive: Drive::new(rig, file),
