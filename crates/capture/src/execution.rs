@@ -1,46 +1,25 @@
 use std::time::{Duration, SystemTime};
 
-use rig::{Drive, DriveError, Exposure, Gain, Identity, Rig, RigFile};
-use sweep::{Plan, Step, SweepError};
+use rig::{Drive, Exposure, Gain, Identity, Rig, RigFile};
+use sweep::{Plan, Step};
 use tokio::sync::watch;
 
 use crate::clock::DeviceClock;
 use crate::exposure::Ranging;
 use crate::progress::Progress;
-use crate::{
-    CaptureError, Command, Event, Flag, Journal, JournalError, Outcome, Reading, Record, State, mechanics,
-};
+use crate::{CaptureError, Command, Event, Flag, Journal, Reading, Record, State, mechanics};
+
+mod shutdown;
+
+pub(crate) use shutdown::Interrupt;
 
 /// Most exposures of one reading in one execution: from one end of the range to the other takes six, by a factor of
 /// about 16 each.
 pub(crate) const MAX_EXPOSURES: u32 = 8;
-/// Longest time for which an operator's command is not looked at, and between two looks at a paused rig; well below
-/// the watchdogs.
+/// Longest time between two looks at a rig that waits, and at what the operator wants.
 const LOOK: Duration = Duration::from_millis(200);
 /// Ticks of the photometer's clock per second.
 const TICKS_PER_S: f64 = 1e5;
-
-/// Why an execution ends before its last step.
-#[derive(Debug)]
-pub(crate) enum Interrupt<E: rig::Fault> {
-    Stop,
-    Estop,
-    Fault(DriveError<E>),
-    Way(SweepError),
-    Refused(CaptureError),
-}
-
-impl<E: rig::Fault> From<DriveError<E>> for Interrupt<E> {
-    fn from(error: DriveError<E>) -> Self {
-        Self::Fault(error)
-    }
-}
-
-impl<E: rig::Fault> From<JournalError> for Interrupt<E> {
-    fn from(error: JournalError) -> Self {
-        Self::Refused(CaptureError::Journal(error))
-    }
-}
 
 /// One execution of a plan, from who-are-you to lamp off.
 pub(crate) struct Execution<'a, R: Rig> {
@@ -256,7 +235,7 @@ impl<'a, R: Rig> Execution<'a, R> {
             let mut left = self.file.photometer.lamp_warm_up;
             while !left.is_zero() {
                 self.obey().await?;
-                let slice = left.min(LOOK);
+                let slice = left.min(self.look_every());
                 self.drive.wait(slice).await?;
                 left -= slice;
                 self.look().await?;
@@ -284,7 +263,7 @@ impl<'a, R: Rig> Execution<'a, R> {
                 self.state(State::Paused);
             }
             // The host's clock, since a simulator's runs ahead only when told to wait.
-            let _ = tokio::time::timeout(LOOK, self.control.changed()).await;
+            let _ = tokio::time::timeout(self.look_every(), self.control.changed()).await;
             self.mark = self.look().await?;
         }
         if paused {
@@ -293,74 +272,19 @@ impl<'a, R: Rig> Execution<'a, R> {
         Ok(())
     }
 
+    /// Time between two looks at a rig that waits: three per watchdog time, since one may be late.
+    fn look_every(&self) -> Duration {
+        match self.file.motion.watchdog {
+            Duration::ZERO => LOOK,
+            watchdog => LOOK.min(watchdog / 3),
+        }
+    }
+
     /// Looks at every device, so that no watchdog trips, and at the photometer's clock, so that no wrap is missed.
     async fn look(&mut self) -> Result<u64, Interrupt<R::Error>> {
         self.drive.snapshot().await?;
         let ticks = self.drive.ticks().await?;
         Ok(self.clock.unwrap(ticks))
-    }
-
-    /// Makes the rig safe and records how it ended.
-    pub(crate) async fn finish(
-        mut self,
-        result: Result<(), Interrupt<R::Error>>,
-    ) -> Result<Outcome, CaptureError> {
-        let at_rest = matches!(result, Ok(()) | Err(Interrupt::Stop));
-        let unsafe_left = match result {
-            _ if !self.touched => Vec::new(),
-            _ if at_rest => self.drive.disengage_all().await,
-            Err(Interrupt::Estop) => {
-                let mut failed = self.drive.halt_all().await;
-                failed.extend(self.drive.disengage_all().await);
-                failed
-            }
-            _ => self.stop().await,
-        };
-        for error in &unsafe_left {
-            tracing::warn!("while shutting down: {}", chain(error));
-        }
-        let mut outcome = match result {
-            Ok(()) => Outcome::Done,
-            Err(Interrupt::Stop) => Outcome::Stopped,
-            Err(Interrupt::Estop) => Outcome::Failed {
-                fault: "emergency stop".to_owned(),
-            },
-            Err(Interrupt::Fault(fault)) => Outcome::Failed { fault: chain(&fault) },
-            Err(Interrupt::Way(error)) => Outcome::Failed { fault: chain(&error) },
-            Err(Interrupt::Refused(error)) => return Err(error),
-        };
-        if let (true, Some(error)) = (at_rest, unsafe_left.first()) {
-            outcome = Outcome::Failed {
-                fault: format!("could not shut down: {}", chain(error)),
-            };
-        }
-        let device_ticks = match self.touched && unsafe_left.is_empty() {
-            true => self.drive.ticks().await.ok(),
-            false => None,
-        };
-        let device_ticks = device_ticks.map(|ticks| self.clock.unwrap(ticks));
-        self.journal.append(&Record::End {
-            outcome: outcome.clone(),
-            device_ticks,
-            at: now(),
-        })?;
-        Ok(outcome)
-    }
-
-    /// Makes the rig safe after a panic; the journal is left as it is.
-    pub(crate) async fn abandon(mut self) {
-        for error in self.stop().await {
-            tracing::warn!("while shutting down: {}", chain(&error));
-        }
-    }
-
-    async fn stop(&mut self) -> Vec<DriveError<R::Error>> {
-        if !self.touched {
-            return Vec::new();
-        }
-        let mut failed = self.drive.stop_all().await;
-        failed.extend(self.drive.disengage_all().await);
-        failed
     }
 
     fn emit(&mut self, event: Event) {
@@ -401,10 +325,4 @@ fn last_ticks(records: &[Record]) -> Option<u64> {
 /// Wall clock, RFC 3339, UTC.
 fn now() -> String {
     humantime::format_rfc3339_millis(SystemTime::now()).to_string()
-}
-
-/// An error with its causes.
-fn chain(error: &dyn std::error::Error) -> String {
-    let causes = std::iter::successors(error.source(), |error| error.source());
-    causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
 }

@@ -135,7 +135,9 @@ async fn a_journal_without_header_runs_nothing() {
 
 #[tokio::test(start_paused = true)]
 async fn a_pause_holds_everything_until_it_ends() {
-    let mut scene = Scene::new(SHORT, "").await;
+    // A watchdog that is soon hungry.
+    let file = rig::RigFile::parse("[motion]\nwatchdog_ms = 100", "test.toml".as_ref()).unwrap();
+    let mut scene = Scene::on(file, SHORT).await;
     let control = scene.control.clone();
     let bench = scene.bench.clone();
     let mut pause = after(35, &scene.control, Command::Pause);

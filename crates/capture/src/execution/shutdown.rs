@@ -1,0 +1,98 @@
+use rig::{DriveError, Rig};
+use sweep::SweepError;
+
+use super::{Execution, now};
+use crate::{CaptureError, JournalError, Outcome, Record};
+
+/// Why an execution ends before its last step.
+#[derive(Debug)]
+pub(crate) enum Interrupt<E: rig::Fault> {
+    Stop,
+    Estop,
+    Fault(DriveError<E>),
+    Way(SweepError),
+    Refused(CaptureError),
+}
+
+impl<E: rig::Fault> From<DriveError<E>> for Interrupt<E> {
+    fn from(error: DriveError<E>) -> Self {
+        Self::Fault(error)
+    }
+}
+
+impl<E: rig::Fault> From<JournalError> for Interrupt<E> {
+    fn from(error: JournalError) -> Self {
+        Self::Refused(CaptureError::Journal(error))
+    }
+}
+
+impl<R: Rig> Execution<'_, R> {
+    /// Makes the rig safe and records how it ended.
+    pub(crate) async fn finish(
+        mut self,
+        result: Result<(), Interrupt<R::Error>>,
+    ) -> Result<Outcome, CaptureError> {
+        let at_rest = matches!(result, Ok(()) | Err(Interrupt::Stop));
+        let unsafe_left = match result {
+            _ if !self.touched => Vec::new(),
+            _ if at_rest => self.drive.disengage_all().await,
+            Err(Interrupt::Estop) => {
+                let mut failed = self.drive.halt_all().await;
+                failed.extend(self.drive.disengage_all().await);
+                failed
+            }
+            _ => self.stop().await,
+        };
+        for error in &unsafe_left {
+            tracing::warn!("while shutting down: {}", chain(error));
+        }
+        let mut outcome = match result {
+            Ok(()) => Outcome::Done,
+            Err(Interrupt::Stop) => Outcome::Stopped,
+            Err(Interrupt::Estop) => Outcome::Failed {
+                fault: "emergency stop".to_owned(),
+            },
+            Err(Interrupt::Fault(fault)) => Outcome::Failed { fault: chain(&fault) },
+            Err(Interrupt::Way(error)) => Outcome::Failed { fault: chain(&error) },
+            Err(Interrupt::Refused(error)) => return Err(error),
+        };
+        if let (true, Some(error)) = (at_rest, unsafe_left.first()) {
+            outcome = Outcome::Failed {
+                fault: format!("could not shut down: {}", chain(error)),
+            };
+        }
+        let device_ticks = match self.touched && unsafe_left.is_empty() {
+            true => self.drive.ticks().await.ok(),
+            false => None,
+        };
+        let device_ticks = device_ticks.map(|ticks| self.clock.unwrap(ticks));
+        self.journal.append(&Record::End {
+            outcome: outcome.clone(),
+            device_ticks,
+            at: now(),
+        })?;
+        Ok(outcome)
+    }
+
+    /// Makes the rig safe after a panic; the journal is left as it is.
+    pub(crate) async fn abandon(mut self) {
+        for error in self.stop().await {
+            tracing::warn!("while shutting down: {}", chain(&error));
+        }
+    }
+
+    async fn stop(&mut self) -> Vec<DriveError<R::Error>> {
+        if !self.touched {
+            return Vec::new();
+        }
+        let mut failed = self.drive.stop_all().await;
+        failed.extend(self.drive.disengage_all().await);
+        failed
+    }
+}
+
+/// An error with its causes.
+fn chain(error: &dyn std::error::Error) -> String {
+    let causes = std::iter::successors(error.source(), |error| error.source());
+    causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
+}
