@@ -5,17 +5,22 @@
 //! Parameterization". The crate knows nothing of arms, rigs or files.
 
 mod albedo;
+mod choice;
 mod compare;
 mod coordinates;
 mod density;
 mod error;
 mod factor;
+mod lobe;
 mod model;
 mod observation;
+mod planes;
 mod quantile;
 mod separable;
+mod shape;
 mod sides;
 mod spread;
+mod sweeps;
 
 pub use albedo::albedo;
 pub use compare::{Channels, Comparison, Draw, Metrics, compare};
@@ -25,5 +30,7 @@ pub use error::Error;
 pub use factor::Factor;
 pub use model::{FactorTable, Model};
 pub use observation::Observation;
+pub use planes::Planes;
 pub use separable::Separable;
+pub use shape::Shape;
 pub use spread::{Distribution, Spread, spread};

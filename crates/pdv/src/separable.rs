@@ -9,7 +9,7 @@ const BLACK: f64 = 1e-6;
 /// ln(1 + ρ) is kept below this (ρ = 1e13 sr⁻¹), so that no product of factors overflows.
 const LOG_MAX: f64 = 30.0;
 /// Largest difference of θ_r within a plane, rad: what a servo may stand off its goal, and no other plane.
-const THETA_R_SPREAD: f64 = 0.02;
+pub(crate) const THETA_R_SPREAD: f64 = 0.02;
 /// Largest difference of d_p within an arc.
 const OFFSET_SPREAD: f64 = 0.05;
 
@@ -172,7 +172,11 @@ fn sin_o_and_d_p(incident: DVec3, exitant: DVec3) -> (f64, f64) {
 }
 
 /// Mean of what should stand still; non-finite values are left out.
-fn steady(what: &'static str, values: impl Iterator<Item = f64>, allowed: f64) -> Result<f64, Error> {
+pub(crate) fn steady(
+    what: &'static str,
+    values: impl Iterator<Item = f64>,
+    allowed: f64,
+) -> Result<f64, Error> {
     let values: Vec<f64> = values.filter(|value| value.is_finite()).collect();
     let low = values.iter().copied().fold(f64::INFINITY, f64::min);
     let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);

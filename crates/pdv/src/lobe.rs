@@ -1,0 +1,136 @@
+use glam::DVec3;
+
+use crate::sweeps::{Point, Side};
+use crate::{Error, Factor};
+
+/// Half angle, rad, below which the lobe is interpolated linearly in θ_h and above which in ln θ_h.
+const KNEE: f64 = 0.005;
+/// A side whose first reading is farther out than this, rad, has its peak hidden by the arms.
+const HIDDEN: f64 = 0.02;
+/// What rounding may carry a half angle beyond the end of its own side, rad.
+const ROUNDING: f64 = 1e-9;
+
+/// G(θ_h, θ_d), the lobe relative to its peak, from the sides of the planes.
+///
+/// Along a side θ_h runs and θ_d follows from it. Elsewhere ln G is linear in θ_d between the sides next to it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Lobe {
+    curves: Vec<Curve>,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Curve {
+    theta_r: f64,
+    sign: f64,
+    from: f64,
+    to: f64,
+    /// ln G over [`warped`] θ_h.
+    log: Factor,
+}
+
+impl Curve {
+    /// θ_d of the curve at a half angle.
+    #[inline]
+    fn theta_d(&self, theta_h: f64) -> f64 {
+        (self.sign * theta_h - self.theta_r).abs()
+    }
+
+    #[inline]
+    fn covers(&self, theta_h: f64) -> bool {
+        self.from - ROUNDING <= theta_h && theta_h <= self.to + ROUNDING
+    }
+}
+
+/// ln(1 + θ_h/knee).
+#[inline]
+fn warped(theta_h: f64) -> f64 {
+    (theta_h / KNEE).ln_1p()
+}
+
+impl Lobe {
+    /// The lobe of sides whose points are given ln G by `log_g`.
+    ///
+    /// A side that begins near the peak counts as known from there, with G = 1 at the peak itself if `tied`.
+    pub(crate) fn new(sides: &[Side], tied: bool, log_g: impl Fn(&Point) -> DVec3) -> Result<Self, Error> {
+        let curve = |side: &Side| {
+            let x = |theta_h: f64| warped(theta_h.abs());
+            let first = side.points[0].theta_h.abs();
+            let shown = first < HIDDEN;
+            let peak = (tied && shown && first > 0.0).then_some((x(0.0), DVec3::ZERO));
+            let points = side.points.iter().map(|p| (x(p.theta_h), log_g(p)));
+            Ok(Curve {
+                theta_r: side.theta_r,
+                sign: side.sign,
+                from: if shown { 0.0 } else { first },
+                to: side.points[side.points.len() - 1].theta_h.abs(),
+                log: Factor::new("G", peak.into_iter().chain(points))?,
+            })
+        };
+        Ok(Self {
+            curves: sides.iter().map(curve).collect::<Result<_, _>>()?,
+        })
+    }
+
+    /// ln G; `without` names a curve that is not used.
+    #[inline]
+    pub(crate) fn log(&self, theta_h: f64, theta_d: f64, without: Option<usize>) -> DVec3 {
+        let x = warped(theta_h);
+        let mut below: Option<(f64, &Curve)> = None;
+        let mut above: Option<(f64, &Curve)> = None;
+        for (n, curve) in self.curves.iter().enumerate() {
+            if Some(n) == without || !curve.covers(theta_h) {
+                continue;
+            }
+            let at = curve.theta_d(theta_h);
+            if at <= theta_d {
+                if below.is_none_or(|(best, _)| at > best) {
+                    below = Some((at, curve));
+                }
+            } else if above.is_none_or(|(best, _)| at < best) {
+                above = Some((at, curve));
+            }
+        }
+        match (below, above) {
+            (Some((low, a)), Some((high, b))) => {
+                a.log.at(x).lerp(b.log.at(x), (theta_d - low) / (high - low))
+            }
+            (Some((_, curve)), None) | (None, Some((_, curve))) => curve.log.at(x),
+            (None, None) => self
+                .nearest(theta_h, without)
+                .map_or(DVec3::ZERO, |curve| curve.log.at(x)),
+        }
+    }
+
+    /// The curve that ends nearest to a half angle which none covers.
+    #[cold]
+    fn nearest(&self, theta_h: f64, without: Option<usize>) -> Option<&Curve> {
+        let gap = |curve: &Curve| (curve.from - theta_h).max(theta_h - curve.to);
+        let others = self
+            .curves
+            .iter()
+            .enumerate()
+            .filter(|&(n, _)| Some(n) != without);
+        others
+            .map(|(_, curve)| curve)
+            .min_by(|a, b| gap(a).total_cmp(&gap(b)))
+    }
+
+    /// Whether any curve reaches this half angle.
+    pub(crate) fn covers(&self, theta_h: f64) -> bool {
+        self.curves.iter().any(|curve| curve.covers(theta_h))
+    }
+
+    /// The largest half angle of any curve but one; 0 where there is no other.
+    pub(crate) fn reach_without(&self, without: usize) -> f64 {
+        let others = self.curves.iter().enumerate().filter(|&(n, _)| n != without);
+        others.map(|(_, curve)| curve.to).fold(0.0, f64::max)
+    }
+
+    /// Rows (θ_h in degrees, ln G) of every side, plane by plane, towards the normal first.
+    pub(crate) fn rows(&self) -> impl Iterator<Item = Vec<(f64, DVec3)>> {
+        self.curves.iter().map(|curve| {
+            let row = |(x, log): (f64, DVec3)| ((KNEE * x.exp_m1()).to_degrees(), log);
+            curve.log.points().map(row).collect()
+        })
+    }
+}

@@ -1,0 +1,73 @@
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+
+/// Smallest cosine in the shadowing term, so that it stays finite at the horizon.
+const COS_MIN: f64 = 1e-4;
+
+/// What joins lobe, arc and diffuse floor of [`crate::Planes`]; the same for the channels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Shape {
+    /// s, sr⁻¹, above 0: lobe and arc multiply far below it, and the lobe narrows as its peak rises far above it.
+    pub scale: f64,
+    /// q, 0 … 1: the diffuse floor as a share of the smallest reading.
+    pub diffuse: f64,
+    /// a, 0 … 1: 1 without shadowing; towards 0 the lobe brightens to grazing like 1/(cos θ_i cos θ_o).
+    pub shadowing: f64,
+    /// κ ≥ 0: the diffuse floor darkens like (cos θ_i cos θ_o)^κ.
+    pub darkening: f64,
+}
+
+impl Shape {
+    /// Taken where the readings cannot tell: the one that serves the fitted MERL materials best as a whole.
+    pub const DEFAULT: Self = Self {
+        scale: 1.0,
+        diffuse: 0.9,
+        shadowing: 0.3,
+        darkening: 0.1,
+    };
+
+    /// s·V, V the shadowing of both directions.
+    #[inline]
+    pub(crate) fn lobe_scale(&self, cos_i: f64, cos_o: f64) -> f64 {
+        let one = |cos: f64| cos.max(COS_MIN) * (1.0 - self.shadowing) + self.shadowing;
+        self.scale / (one(cos_i) * one(cos_o))
+    }
+
+    /// What the diffuse floor is multiplied by.
+    #[inline]
+    pub(crate) fn falloff(&self, cos_i: f64, cos_o: f64) -> f64 {
+        if self.darkening == 0.0 {
+            return 1.0;
+        }
+        (cos_i * cos_o).max(0.0).powf(self.darkening)
+    }
+}
+
+/// The diffuse floor and what lies above it, for one shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Excess {
+    pub(crate) shape: Shape,
+    /// A, the diffuse floor towards the normal, sr⁻¹.
+    pub(crate) diffuse: DVec3,
+    /// The least that counts as above the floor, sr⁻¹; 0 in a black channel.
+    pub(crate) least: DVec3,
+}
+
+impl Excess {
+    /// Exponents are kept below this, so that nothing overflows.
+    const LOG_MAX: f64 = 60.0;
+
+    /// G·F of a reflectance: ln(1 + excess/(s V)).
+    #[inline]
+    pub(crate) fn log(&self, rgb: DVec3, cos_i: f64, cos_o: f64) -> DVec3 {
+        let excess = (rgb - self.diffuse * self.shape.falloff(cos_i, cos_o)).max(self.least);
+        (excess / self.shape.lobe_scale(cos_i, cos_o)).map(f64::ln_1p)
+    }
+
+    /// The reflectance of a G·F.
+    #[inline]
+    pub(crate) fn reflectance(&self, log: DVec3, cos_i: f64, cos_o: f64) -> DVec3 {
+        let lobe = log.min(DVec3::splat(Self::LOG_MAX)).map(f64::exp_m1);
+        self.diffuse * self.shape.falloff(cos_i, cos_o) + lobe * self.shape.lobe_scale(cos_i, cos_o)
+    }
+}

@@ -1,0 +1,147 @@
+use glam::DVec3;
+
+use crate::separable::{THETA_R_SPREAD, steady};
+use crate::{Error, Observation, light_angle};
+
+/// Readings closer than this in half angle, rad, are one pose and averaged.
+const SAME: f64 = 1e-7;
+/// The least reflectance, sr⁻¹, that is told from black.
+const LEAST: f64 = 1e-9;
+
+/// A reading by its half and difference angle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Point {
+    /// Angle between half vector and normal, rad; negative where the light stands outwards of the mirror direction.
+    pub(crate) theta_h: f64,
+    /// Half the angle between the directions, rad.
+    pub(crate) theta_d: f64,
+    pub(crate) cos_i: f64,
+    pub(crate) cos_o: f64,
+    /// sr⁻¹, ≥ 0.
+    pub(crate) rgb: DVec3,
+}
+
+impl Point {
+    /// `None` where a number is not finite or no light can stand there.
+    fn new(o: &Observation) -> Option<Self> {
+        let alpha = light_angle(o.theta_r, o.deviation)?;
+        let theta_h = 0.5 * (alpha + o.theta_r);
+        let point = Self {
+            theta_h: if theta_h.abs() < SAME { 0.0 } else { theta_h },
+            theta_d: 0.5 * (alpha - o.theta_r).abs(),
+            cos_i: alpha.cos(),
+            cos_o: o.theta_r.cos(),
+            rgb: o.rgb.max(DVec3::ZERO),
+        };
+        (o.rgb.is_finite() && point.theta_h.is_finite()).then_some(point)
+    }
+}
+
+/// One side of the mirror direction in one plane.
+#[derive(Clone, Debug)]
+pub(crate) struct Side {
+    pub(crate) theta_r: f64,
+    /// +1 towards the normal, −1 outwards.
+    pub(crate) sign: f64,
+    /// Ascending in |θ_h|, no two at the same.
+    pub(crate) points: Vec<Point>,
+}
+
+/// All readings of a run, as far as they can be used.
+#[derive(Clone, Debug)]
+pub(crate) struct Sweeps {
+    pub(crate) sides: Vec<Side>,
+    /// The mirror arc; without one, of each plane the reading nearest to the mirror direction.
+    pub(crate) arc: Vec<Point>,
+    /// Below this, sr⁻¹, nothing is told from black; 0 in a channel without any light.
+    pub(crate) least: DVec3,
+    /// Readings left out.
+    pub(crate) dropped: usize,
+}
+
+impl Sweeps {
+    pub(crate) fn new(planes: &[Vec<Observation>], arc: &[Observation]) -> Result<Self, Error> {
+        let all = planes.iter().map(Vec::len).sum::<usize>() + arc.len();
+        let points = |sweep: &[Observation]| sweep.iter().filter_map(Point::new).collect::<Vec<_>>();
+        let mut sides = Vec::new();
+        let mut kept = 0;
+        let mut peaks = Vec::new();
+        for plane in planes {
+            let theta_r = steady(
+                "θ_r of a plane, in rad,",
+                plane.iter().map(|o| o.theta_r),
+                THETA_R_SPREAD,
+            )?;
+            let found = points(plane);
+            kept += found.len();
+            peaks.extend(
+                found
+                    .iter()
+                    .min_by(|a, b| a.theta_h.abs().total_cmp(&b.theta_h.abs())),
+            );
+            for sign in [1.0, -1.0] {
+                let points = merged(found.iter().filter(|p| p.theta_h * sign >= 0.0));
+                // A peak alone has no side.
+                if points.last().is_some_and(|p| p.theta_h != 0.0) {
+                    sides.push(Side {
+                        theta_r,
+                        sign,
+                        points,
+                    });
+                }
+            }
+        }
+        let mut along = points(arc);
+        kept += along.len();
+        let dropped = all - kept;
+        if kept == along.len() {
+            return Err(Error::Empty { factor: "G", dropped });
+        }
+        if !arc.is_empty() && along.is_empty() {
+            return Err(Error::Empty { factor: "F", dropped });
+        }
+        if along.is_empty() {
+            along = peaks;
+        }
+        let readings = || planes.iter().flatten().chain(arc).filter(|o| o.rgb.is_finite());
+        Ok(Self {
+            sides,
+            arc: along,
+            least: least(readings().map(|o| o.rgb)),
+            dropped,
+        })
+    }
+
+    pub(crate) fn points(&self) -> impl Iterator<Item = &Point> {
+        self.sides.iter().flat_map(|side| &side.points).chain(&self.arc)
+    }
+}
+
+/// Sorted by |θ_h|, those at one place averaged.
+fn merged<'a>(points: impl Iterator<Item = &'a Point>) -> Vec<Point> {
+    let mut points: Vec<Point> = points.copied().collect();
+    points.sort_by(|a, b| a.theta_h.abs().total_cmp(&b.theta_h.abs()));
+    let mean = |same: &[Point]| Point {
+        rgb: same.iter().map(|p| p.rgb).sum::<DVec3>() / same.len() as f64,
+        ..same[0]
+    };
+    points
+        .chunk_by(|a, b| b.theta_h.abs() - a.theta_h.abs() < SAME)
+        .map(mean)
+        .collect()
+}
+
+/// Per channel what is told from black: at least the root mean square of the readings below 0, which are noise.
+fn least(readings: impl Iterator<Item = DVec3> + Clone) -> DVec3 {
+    let channel = |c: usize| {
+        let values = readings.clone().map(move |rgb| rgb[c]);
+        if values.clone().all(|value| value <= 0.0) {
+            return 0.0;
+        }
+        let (count, squares) = values
+            .filter(|&value| value < 0.0)
+            .fold((0.0, 0.0), |(n, sum), value| (n + 1.0, sum + value * value));
+        (squares / f64::max(count, 1.0)).sqrt().max(LEAST)
+    };
+    DVec3::new(channel(0), channel(1), channel(2))
+}
