@@ -54,9 +54,9 @@ const CASES: [Case; 13] = [
     },
     Case {
         name: "arms that would meet",
-        job: "[[plane]]\ntheta_r_deg = 10.0\nreadings = 10\n",
-        rig: "[bus]\nport = \"PORT\"\n[light]\nmin_deg = 0.0\nmax_deg = 40.0\n[envelope]\nseparation_deg = 60.0\n[motion]\npark_light_deg = 5.0\npark_sensor_deg = 70.0\n[sim]\nstart_light_deg = 5.0\nstart_sensor_deg = 70.0\n",
-        says: &["job.toml", "plane[0]", "60"],
+        job: JOB,
+        rig: "[bus]\nport = \"PORT\"\n[motion]\npark_light_deg = 42.0\npark_sensor_deg = 45.0\n",
+        says: &["rig.toml", "park_sensor_deg", "3.000° apart", "5.000°"],
     },
     Case {
         name: "unknown key in the rig file",

@@ -73,6 +73,17 @@ pub(crate) enum Command {
         #[command(flatten)]
         output: Output,
     },
+    /// Judge the reconstruction over many materials without a rig: the paper's evaluation unless a file says otherwise.
+    Study {
+        /// The study file; the built-in one unless given.
+        study: Option<PathBuf>,
+        /// A hundredth of it, in seconds.
+        #[arg(long)]
+        quick: bool,
+        /// Where to write study.csv and summary.json; rows go to stdout unless given.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
 }
 
 /// Which rig.

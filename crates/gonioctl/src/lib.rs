@@ -12,6 +12,7 @@ mod print;
 mod progress;
 mod reconstruct;
 mod run;
+mod study;
 
 use std::process::ExitCode;
 
@@ -64,6 +65,7 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             estimate,
             output,
         } => eval::eval(&truth, &estimate, output.json)?,
+        Command::Study { study, quick, out } => study::study(study.as_deref(), quick, out.as_deref())?,
         Command::Reconstruct { run, output } => reconstruct::reconstruct(run, output.json)?,
     }
     Ok(ExitCode::SUCCESS)

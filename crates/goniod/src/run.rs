@@ -82,6 +82,14 @@ pub async fn resume(
     let Some(Record::Header(header)) = journal.records().first() else {
         return Err(capture::CaptureError::NoHeader.into());
     };
+    if report::Run::new(header, journal.records()).complete() {
+        let report = report::write(&directory, journal.records())?;
+        return Ok(Ended {
+            directory,
+            outcome: Outcome::Done,
+            report,
+        });
+    }
     let order = Order::resumed(header)?;
     let mut station = Station::open(&order)?;
     finish(directory, &mut station, &mut journal, control, on_event).await

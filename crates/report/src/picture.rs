@@ -2,7 +2,8 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 
 use exr::prelude::{
-    AttributeValue, Encoding, Image, Layer, LayerAttributes, SpecificChannels, Text, Vec2, WritableImage,
+    AttributeValue, Encoding, Image, Layer, LayerAttributes, LineOrder, SpecificChannels, Text, Vec2,
+    WritableImage,
 };
 use glam::DVec3;
 
@@ -55,11 +56,16 @@ impl Picture {
         let layer = Layer::new(
             (self.width, self.height()),
             header,
-            Encoding::FAST_LOSSLESS,
+            // In a fixed order, so that the same picture is the same file.
+            Encoding {
+                line_order: LineOrder::Increasing,
+                ..Encoding::FAST_LOSSLESS
+            },
             SpecificChannels::rgb(pixel),
         );
         Image::from_layer(layer)
             .write()
+            .non_parallel()
             .to_buffered(file)
             .map_err(|error| match error {
                 exr::error::Error::Io(error) => error,

@@ -1,0 +1,5 @@
+//! `firmware-sim` under a name that does not clash with the real one, so that tests find it beside them.
+
+fn main() -> std::process::ExitCode {
+    firmware_sim::main()
+}

@@ -1,0 +1,181 @@
+//! A run that is stopped, or runs out of disk, loses nothing and can be gone on with.
+
+// The exemption for tests does not reach what they share.
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+
+use capture::{Outcome, Record};
+use rustix::process::{Pid, Signal, kill_process};
+use tests::{Captured, Finished, run};
+
+const GONIOCTL: &str = env!("CARGO_BIN_EXE_e2e-gonioctl");
+
+/// Long enough not to be over before it is stopped.
+const JOB: &str = "[[plane]]\ntheta_r_deg = 70.0\nreadings = 400\n[arc]\nreadings = 400\n";
+const RUN: [&str; 4] = ["run", "job.toml", "--rig", "rig.toml"];
+
+fn prepare(directory: &Path) {
+    fs::write(directory.join("job.toml"), JOB).unwrap();
+    fs::write(directory.join("rig.toml"), "").unwrap();
+}
+
+fn only_run(directory: &Path) -> PathBuf {
+    let runs: Vec<_> = fs::read_dir(directory.join("runs"))
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .collect();
+    assert_eq!(runs.len(), 1, "{runs:?}");
+    runs[0].clone()
+}
+
+/// Starts a run that tells every event, and returns once it has told of so many readings.
+fn started(directory: &Path, readings: usize) -> (Child, BufReader<std::process::ChildStderr>) {
+    let mut child = Command::new(GONIOCTL)
+        .args(RUN)
+        .current_dir(directory)
+        .env("RUST_LOG", "gonioctl=debug")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut stderr = BufReader::new(child.stderr.take().unwrap());
+    let (mut line, mut seen) = (String::new(), 0);
+    while seen < readings {
+        line.clear();
+        assert!(
+            stderr.read_line(&mut line).unwrap() > 0,
+            "it ended before {readings} readings"
+        );
+        seen += usize::from(line.contains("Reading {"));
+    }
+    (child, stderr)
+}
+
+fn signal(child: &Child, signal: Signal) {
+    let id = Pid::from_raw(child.id().try_into().unwrap()).unwrap();
+    kill_process(id, signal).unwrap();
+}
+
+fn ended(child: Child, mut stderr: impl Read) -> Finished {
+    let mut said = String::new();
+    stderr.read_to_string(&mut said).unwrap();
+    let mut finished = Finished::from(child.wait_with_output().unwrap());
+    finished.stderr = said;
+    finished
+}
+
+/// Resumes a run and asserts that every step then has one accepted reading, and that nothing was lost.
+fn resume(directory: &Path, before: &Captured) {
+    let path = before.directory.to_str().unwrap();
+    let _ = run(GONIOCTL, directory, &["run", "--resume", path]).expect(0);
+    let whole = Captured::read(&before.directory);
+    assert_eq!(
+        &whole.records[..before.records.len()],
+        &before.records[..],
+        "nothing was lost"
+    );
+    let Some(Record::Header(header)) = whole.records.first() else {
+        panic!("no header");
+    };
+    let mut accepted = vec![0; header.plan.steps.len()];
+    for reading in whole.readings().filter(|reading| reading.accepted) {
+        accepted[reading.step] += 1;
+    }
+    assert!(accepted.iter().all(|&n| n == 1), "each pose is measured once");
+    assert!(before.directory.join("brdf.binary").exists());
+    // A run that is done is only reported again.
+    let _ = run(GONIOCTL, directory, &["run", "--resume", path]).expect(0);
+    assert_eq!(Captured::read(&before.directory).records, whole.records);
+}
+
+#[test]
+fn one_interrupt_finishes_the_reading_and_leaves_a_run_to_resume() {
+    let temporary = tempfile::tempdir().unwrap();
+    prepare(temporary.path());
+    let (child, stderr) = started(temporary.path(), 100);
+    signal(&child, Signal::INT);
+    let finished = ended(child, stderr).expect(4);
+    assert!(
+        finished.stderr.contains("--resume"),
+        "it says how to go on: {}",
+        finished.stderr
+    );
+    let directory = only_run(temporary.path());
+    let stopped = Captured::read(&directory);
+    let last = stopped.records.last();
+    assert!(
+        matches!(
+            last,
+            Some(Record::End {
+                outcome: Outcome::Stopped,
+                ..
+            })
+        ),
+        "{last:?}"
+    );
+    let readings = stopped.readings().count();
+    assert!((100..800).contains(&readings), "{readings} readings");
+    assert!(
+        !directory.join("brdf.binary").exists(),
+        "half a run makes no BRDF"
+    );
+    assert!(directory.join("report.html").exists(), "but a report");
+    resume(temporary.path(), &stopped);
+}
+
+#[test]
+fn a_second_interrupt_is_an_emergency_stop() {
+    let temporary = tempfile::tempdir().unwrap();
+    prepare(temporary.path());
+    // A long dwell before each reading, so that the second signal comes before the reading in hand is finished.
+    fs::write(
+        temporary.path().join("rig.toml"),
+        "motion.settle_ms = 5000\nsim.clock = \"real\"\n",
+    )
+    .unwrap();
+    let (child, mut stderr) = started(temporary.path(), 1);
+    signal(&child, Signal::INT);
+    let mut line = String::new();
+    while !line.contains("again for an emergency stop") {
+        line.clear();
+        assert!(
+            stderr.read_line(&mut line).unwrap() > 0,
+            "it did not say that it stops"
+        );
+    }
+    signal(&child, Signal::INT);
+    let finished = ended(child, stderr).expect(3);
+    assert!(finished.stderr.contains("emergency stop"), "{}", finished.stderr);
+    let stopped = Captured::read(&only_run(temporary.path()));
+    let last = stopped.records.last();
+    assert!(
+        matches!(
+            last,
+            Some(Record::End {
+                outcome: Outcome::Failed { .. },
+                ..
+            })
+        ),
+        "{last:?}"
+    );
+}
+
+#[test]
+fn a_full_disk_loses_nothing() {
+    let temporary = tempfile::tempdir().unwrap();
+    prepare(temporary.path());
+    // A file size limit stands for a full disk: the write fails, in a process that is told so and not killed for it.
+    let limited = "trap '' XFSZ; ulimit -f 600; exec \"$0\" \"$@\"";
+    let arguments = [&["-c", limited, GONIOCTL], &RUN[..]].concat();
+    let finished = run("sh", temporary.path(), &arguments).expect(4);
+    let directory = only_run(temporary.path());
+    assert!(finished.stderr.contains("journal"), "{}", finished.stderr);
+    let full = Captured::read(&directory);
+    let readings = full.readings().count();
+    assert!((1..800).contains(&readings), "{readings} readings");
+    resume(temporary.path(), &full);
+}
