@@ -68,14 +68,14 @@ fn main() {
     let mut group = criterion.benchmark_group("evaluation");
     let exponentials = seconds(&mut group, "three exp_m1, 1024 times", || {
         for log in &logs {
-            let log = black_box(*log);
+            let log = black_box(log);
             black_box(DVec3::new(log.x.exp_m1(), log.y.exp_m1(), log.z.exp_m1()));
         }
     });
     let evaluation = seconds(&mut group, "separable model, 1024 pairs", || {
         for pair in &pairs {
-            let (incident, exitant) = black_box(*pair);
-            black_box(model.eval(incident, exitant));
+            let (incident, exitant) = black_box(pair);
+            black_box(model.eval(*incident, *exitant));
         }
     });
     group.finish();

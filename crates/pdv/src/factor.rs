@@ -1,11 +1,14 @@
 use glam::DVec3;
 
 use crate::Error;
+use crate::grid::Grid;
 
-/// Most cells of the index; more would not stay in the nearest cache.
-const CELLS_MAX: usize = 4096;
+/// Nodes closer than this are one; the cube of their distance must stay a number.
+const SAME: f64 = 1e-18;
+/// What rounding may carry the end of a range beyond itself.
+const ROUNDING: f64 = 1e-12;
 
-/// An RGB function of one variable, known at sorted nodes.
+/// An RGB function of one variable x ≥ 0, known at sorted nodes.
 ///
 /// Between nodes a cubic with the slopes of Fritsch and Butland (1984): monotone where the values are, so it never
 /// leaves their range. Beyond the nodes it is constant, and [`Factor::extrapolated`] says so.
@@ -13,26 +16,50 @@ const CELLS_MAX: usize = 4096;
 pub struct Factor {
     nodes: Vec<f64>,
     values: Vec<DVec3>,
-    /// Coefficients of 1, t, t², t³ with t = x − node, for every interval.
+    /// Whether it begins with slope 0.
+    flat: bool,
+    /// Coefficients of 1, t, t², t³ with t = x − node, from every node to the next, and the constants beyond.
     cubics: Vec<[DVec3; 4]>,
-    /// For every cell of an even grid over the range, the interval in which the cell begins.
-    cells: Vec<u16>,
-    cells_per_unit: f64,
+    grid: Grid,
     dropped: usize,
 }
 
 impl Factor {
-    /// A factor through points (x, RGB) in any order; values at the same x are averaged, points with a number that
-    /// is not finite are dropped and counted. `name` stands in the error.
+    /// A factor through points (x, RGB) in any order; values at the same x are averaged, points with a negative x
+    /// or a number that is not finite are dropped and counted. `name` stands in the error.
+    ///
+    /// It begins with slope 0, as a function does that is even about x = 0.
     ///
     /// # Errors
     /// No point is left.
     pub fn new(name: &'static str, points: impl IntoIterator<Item = (f64, DVec3)>) -> Result<Self, Error> {
+        Self::through(name, points, true)
+    }
+
+    /// As [`Factor::new`], but a function of the square of each x, which needs no root at evaluation.
+    ///
+    /// d_p and sin θ_r are distances on the disk from a point about which nothing has a direction, so what is smooth
+    /// there is smooth in the square. Nodes, range and argument are squares.
+    ///
+    /// # Errors
+    /// No point is left.
+    pub fn over_squares(
+        name: &'static str,
+        points: impl IntoIterator<Item = (f64, DVec3)>,
+    ) -> Result<Self, Error> {
+        Self::through(name, points.into_iter().map(|(x, value)| (x * x, value)), false)
+    }
+
+    fn through(
+        name: &'static str,
+        points: impl IntoIterator<Item = (f64, DVec3)>,
+        flat: bool,
+    ) -> Result<Self, Error> {
         let mut all = 0;
         let mut points: Vec<(f64, DVec3)> = points
             .into_iter()
             .inspect(|_| all += 1)
-            .filter(|(x, value)| x.is_finite() && value.is_finite())
+            .filter(|(x, value)| x.is_finite() && *x >= 0.0 && value.is_finite())
             .collect();
         let dropped = all - points.len();
         if points.is_empty() {
@@ -43,7 +70,7 @@ impl Factor {
         }
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         let (nodes, values): (Vec<f64>, Vec<DVec3>) = points
-            .chunk_by(|a, b| a.0 == b.0)
+            .chunk_by(|a, b| b.0 - a.0 < SAME)
             .map(|same| {
                 (
                     same[0].0,
@@ -51,31 +78,24 @@ impl Factor {
                 )
             })
             .unzip();
-        let cubics = cubics(&nodes, &values);
-        let (cells, cells_per_unit) = cells(&nodes);
+        let cubics = cubics(&nodes, &values, flat);
+        let grid = Grid::new(&nodes);
         Ok(Self {
             nodes,
             values,
+            flat,
             cubics,
-            cells,
-            cells_per_unit,
+            grid,
             dropped,
         })
     }
 
-    /// The value at x; held constant beyond the nodes. A NaN counts as the first node.
-    #[inline]
+    /// The value at x, 0 … 1e100; held constant beyond the nodes.
+    #[inline(always)]
     pub fn at(&self, x: f64) -> DVec3 {
-        let first = self.nodes[0];
-        let x = x.max(first).min(self.nodes[self.nodes.len() - 1]);
-        let cell = ((x - first) * self.cells_per_unit) as usize;
-        let mut interval = usize::from(self.cells[cell.min(self.cells.len() - 1)]);
-        while interval + 2 < self.nodes.len() && self.nodes[interval + 1] <= x {
-            interval += 1;
-        }
-        let t = x - self.nodes[interval];
+        let (interval, t) = self.grid.locate(x);
         let [c0, c1, c2, c3] = self.cubics[interval];
-        c0 + (c1 + (c2 + c3 * t) * t) * t
+        (c0 + c1 * t) + (c2 + c3 * t) * (t * t)
     }
 
     /// First and last node: the measured range.
@@ -85,7 +105,8 @@ impl Factor {
 
     /// Whether x lies beyond the measured range.
     pub fn extrapolated(&self, x: f64) -> bool {
-        !(self.nodes[0]..=self.nodes[self.nodes.len() - 1]).contains(&x)
+        let (first, last) = self.range();
+        !(first - ROUNDING..=last + ROUNDING).contains(&x)
     }
 
     /// Nodes with their values, ascending.
@@ -102,38 +123,40 @@ impl Factor {
     pub(crate) fn map(self, change: impl Fn(DVec3) -> DVec3) -> Self {
         let values: Vec<DVec3> = self.values.into_iter().map(change).collect();
         Self {
-            cubics: cubics(&self.nodes, &values),
+            cubics: cubics(&self.nodes, &values, self.flat),
             values,
             ..self
         }
     }
 }
 
-/// Cubic Hermite coefficients of every interval; one constant piece where there is a single node.
-fn cubics(nodes: &[f64], values: &[DVec3]) -> Vec<[DVec3; 4]> {
-    if nodes.len() == 1 {
-        return vec![[values[0], DVec3::ZERO, DVec3::ZERO, DVec3::ZERO]];
-    }
+/// Cubic Hermite coefficients: a constant before the nodes, every interval, a constant behind.
+fn cubics(nodes: &[f64], values: &[DVec3], flat: bool) -> Vec<[DVec3; 4]> {
+    let constant = |value: DVec3| [value, DVec3::ZERO, DVec3::ZERO, DVec3::ZERO];
+    let last = nodes.len() - 1;
     let widths: Vec<f64> = nodes.windows(2).map(|x| x[1] - x[0]).collect();
     let secants: Vec<DVec3> = values
         .windows(2)
         .zip(&widths)
         .map(|(v, h)| (v[1] - v[0]) / h)
         .collect();
-    let last = nodes.len() - 1;
-    // Flat at the first node: G is even about the mirror direction, and F goes on to θ_r = 0 with zero slope.
-    let mut slopes = vec![DVec3::ZERO; nodes.len()];
-    slopes[last] = secants[last - 1];
-    for n in 1..last {
-        slopes[n] = slope([widths[n - 1], widths[n]], [secants[n - 1], secants[n]]);
-    }
-    (0..widths.len())
-        .map(|n| {
-            let (h, secant) = (widths[n], secants[n]);
-            let bend = (secant * 3.0 - slopes[n] * 2.0 - slopes[n + 1]) / h;
-            let twist = (slopes[n] + slopes[n + 1] - secant * 2.0) / (h * h);
-            [values[n], slopes[n], bend, twist]
+    let slopes: Vec<DVec3> = (0..=last)
+        .map(|n| match n {
+            0 if flat => DVec3::ZERO,
+            0 => secants.first().copied().unwrap_or_default(),
+            n if n == last => secants[last - 1],
+            n => slope([widths[n - 1], widths[n]], [secants[n - 1], secants[n]]),
         })
+        .collect();
+    let cubic = |n: usize| {
+        let (h, secant) = (widths[n], secants[n]);
+        let bend = (secant * 3.0 - slopes[n] * 2.0 - slopes[n + 1]) / h;
+        let twist = (slopes[n] + slopes[n + 1] - secant * 2.0) / (h * h);
+        [values[n], slopes[n], bend, twist]
+    };
+    std::iter::once(constant(values[0]))
+        .chain((0..last).map(cubic))
+        .chain([constant(values[last])])
         .collect()
 }
 
@@ -152,28 +175,6 @@ fn slope([before, after]: [f64; 2], [left, right]: [DVec3; 2]) -> DVec3 {
         channel(left.y, right.y),
         channel(left.z, right.z),
     )
-}
-
-/// An even grid over the nodes, fine enough that a cell seldom holds more than one of them.
-fn cells(nodes: &[f64]) -> (Vec<u16>, f64) {
-    let length = nodes[nodes.len() - 1] - nodes[0];
-    let narrowest = nodes.windows(2).map(|x| x[1] - x[0]).fold(length, f64::min);
-    if length <= 0.0 {
-        return (vec![0], 0.0);
-    }
-    let count = ((length / narrowest).min(CELLS_MAX as f64) as usize).max(1);
-    let cells_per_unit = count as f64 / length;
-    let intervals = nodes.len() - 1;
-    let cells = (0..count)
-        .map(|cell| {
-            let begin = nodes[0] + cell as f64 / cells_per_unit;
-            // A little less, for rounding may put the end of the cell before into this one.
-            let begin = begin - 1e-9 * length;
-            let interval = nodes.partition_point(|&node| node <= begin).saturating_sub(1);
-            interval.min(intervals - 1).min(usize::from(u16::MAX)) as u16
-        })
-        .collect();
-    (cells, cells_per_unit)
 }
 
 #[cfg(test)]
@@ -205,7 +206,7 @@ mod tests {
     #[test]
     fn is_constant_beyond_its_range_and_says_so() {
         let f = factor(&[(0.5, 3.0), (1.0, 1.0)]);
-        assert_eq!((f.at(0.0).x, f.at(7.0).x, f.at(f64::INFINITY).x), (3.0, 1.0, 1.0));
+        assert_eq!((f.at(0.0).x, f.at(7.0).x, f.at(1e100).x), (3.0, 1.0, 1.0));
         assert!(f.extrapolated(0.4999) && f.extrapolated(1.0001) && f.extrapolated(f64::NAN));
         assert!(!f.extrapolated(0.5) && !f.extrapolated(1.0));
         assert_eq!(factor(&[(0.3, 2.0)]).at(9.0), DVec3::new(2.0, 4.0, 0.0));
@@ -227,7 +228,7 @@ mod tests {
         #[test]
         fn prop_meets_its_nodes_and_stays_between_them(
             points in prop::collection::vec((0.0..2.0_f64, 0.0..9.0_f64), 2..200),
-            at in -0.1..2.1_f64,
+            at in 0.0..2.1_f64,
             crowd in 0..9,
         ) {
             // Some nodes crowd as the raw distribution's do.

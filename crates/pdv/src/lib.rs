@@ -11,6 +11,7 @@ mod coordinates;
 mod density;
 mod error;
 mod factor;
+mod grid;
 mod lobe;
 mod model;
 mod observation;

@@ -6,7 +6,7 @@ use crate::{Error, Factor, FactorTable, Model, Observation};
 
 /// G(x) below this, ln(1 + 1e-6 sr⁻¹), is black: no ratio can be made of it.
 const BLACK: f64 = 1e-6;
-/// ln(1 + ρ) is kept below this (ρ = 1e13 sr⁻¹), so that no product of factors overflows.
+/// Largest ln(1 + ρ), ρ = 1e13 sr⁻¹.
 const LOG_MAX: f64 = 30.0;
 /// Largest difference of θ_r within a plane, rad: what a servo may stand off its goal, and no other plane.
 pub(crate) const THETA_R_SPREAD: f64 = 0.02;
@@ -18,12 +18,13 @@ const OFFSET_SPREAD: f64 = 0.05;
 /// G is what a plane at θ_r^dp measures and F_m what an arc measures that keeps d_p = x; both in ln(1 + ρ), per
 /// channel. Where G was measured on both sides of the mirror direction they are averaged, see
 /// [`Separable::from_observations`]. Beyond the measured ranges both factors are held constant, which
-/// [`Model::extrapolated`] tells. Not reciprocal, since F depends on ω_o alone.
+/// [`Model::extrapolated`] tells; ln(1 + ρ) is kept within 0 … 30 (ρ = 1e13 sr⁻¹), so that no product of factors
+/// overflows. Not reciprocal, since F depends on ω_o alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Separable {
     theta_r: f64,
     intersection: f64,
-    /// Over sin θ_r, which needs no arc sine at evaluation.
+    /// Over sin² θ_r and d_p², which need neither angle nor root at evaluation.
     f: Factor,
     g: Factor,
     dropped: usize,
@@ -52,7 +53,7 @@ impl Separable {
             THETA_R_SPREAD,
         )?;
         if arc.is_empty() {
-            let f = Factor::new("F", [(theta_r.sin(), DVec3::ONE)])?;
+            let f = Factor::over_squares("F", [(theta_r.sin(), DVec3::ONE)])?;
             return Ok(Self {
                 theta_r,
                 intersection: 0.0,
@@ -62,7 +63,7 @@ impl Separable {
             });
         }
         let intersection = steady("d_p of an arc", arc.iter().map(|o| o.deviation), OFFSET_SPREAD)?;
-        let measured = Factor::new("F", arc.iter().map(|o| (o.theta_r.sin(), o.log())))?;
+        let measured = Factor::over_squares("F", arc.iter().map(|o| (o.theta_r.sin(), o.log())))?;
         let dropped = sides.dropped() + measured.dropped();
         let at_x = sides.at(intersection);
         let black = at_x.cmplt(DVec3::splat(BLACK));
@@ -110,12 +111,12 @@ impl Separable {
         self.intersection
     }
 
-    /// F over sin θ_r, normalised: 1 at θ_r^dp.
+    /// F over sin² θ_r, normalised: 1 at θ_r^dp.
     pub fn f(&self) -> &Factor {
         &self.f
     }
 
-    /// G over d_p, as ln(1 + ρ).
+    /// G over d_p², as ln(1 + ρ).
     pub fn g(&self) -> &Factor {
         &self.g
     }
@@ -132,15 +133,15 @@ impl Brdf for Separable {
         if !(incident.z > 0.0 && exitant.z > 0.0) {
             return DVec3::ZERO;
         }
-        let (sin_o, d_p) = sin_o_and_d_p(incident, exitant);
-        let log = (self.f.at(sin_o) * self.g.at(d_p)).min(DVec3::splat(LOG_MAX));
-        DVec3::new(log.x.exp_m1(), log.y.exp_m1(), log.z.exp_m1())
+        let [sin_o, d_p] = squares(incident, exitant);
+        let log = self.f.at(sin_o) * self.g.at(d_p);
+        DVec3::new(exp_m1(log.x), exp_m1(log.y), exp_m1(log.z))
     }
 }
 
 impl Model for Separable {
     fn extrapolated(&self, incident: DVec3, exitant: DVec3) -> bool {
-        let (sin_o, d_p) = sin_o_and_d_p(incident, exitant);
+        let [sin_o, d_p] = squares(incident, exitant);
         self.f.extrapolated(sin_o) || self.g.extrapolated(d_p)
     }
 
@@ -148,7 +149,8 @@ impl Model for Separable {
         let f = self
             .f
             .points()
-            .map(|(sin, value)| (sin.asin().to_degrees(), value));
+            .map(|(sin, value)| (sin.sqrt().min(1.0).asin().to_degrees(), value));
+        let g = self.g.points().map(|(square, value)| (square.sqrt(), value));
         vec![
             FactorTable {
                 name: "F",
@@ -158,17 +160,24 @@ impl Model for Separable {
             FactorTable {
                 name: "G",
                 variable: "d_p",
-                rows: self.g.points().collect(),
+                rows: g.collect(),
             },
         ]
     }
 }
 
-/// sin θ_o and d_p = |L_p − R_p| with R_p = −V_p, from unit vectors without any angle.
+/// eˣ − 1 with x kept within 0 … [`LOG_MAX`]: rounding may put a cubic just below its nodes.
 #[inline]
-fn sin_o_and_d_p(incident: DVec3, exitant: DVec3) -> (f64, f64) {
+fn exp_m1(x: f64) -> f64 {
+    let x = if x > 0.0 { x } else { 0.0 };
+    (if x < LOG_MAX { x } else { LOG_MAX }).exp_m1()
+}
+
+/// sin² θ_o and d_p² with d_p = |L_p − R_p| and R_p = −V_p, from unit vectors without any angle.
+#[inline]
+fn squares(incident: DVec3, exitant: DVec3) -> [f64; 2] {
     let (view, deviation) = (exitant.truncate(), incident.truncate() + exitant.truncate());
-    (view.length(), deviation.length())
+    [view.length_squared(), deviation.length_squared()]
 }
 
 /// Mean of what should stand still; non-finite values are left out.

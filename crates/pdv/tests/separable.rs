@@ -47,7 +47,7 @@ fn gives_back_what_it_was_made_of() {
         let (f, g) = (gold.eval(incident, exitant), model.eval(incident, exitant));
         assert!(close(g, f, 1e-12), "{g} instead of {f} at θ_r = {theta}");
     }
-    let at = model.f().at(THETA_R.sin());
+    let at = model.f().at(THETA_R.sin().powi(2));
     assert!(close(at, DVec3::ONE, 1e-4), "F(θ_r^dp) is {at}");
 }
 
@@ -57,7 +57,7 @@ fn the_intersection_may_be_anywhere() {
     for x in [-0.03, 0.02, 0.4] {
         let model = Separable::sample(&gold, THETA_R, &deviations(-0.06), &arc(), x).unwrap();
         assert!((model.intersection() - x).abs() < 1e-15);
-        let at = model.f().at(THETA_R.sin());
+        let at = model.f().at(THETA_R.sin().powi(2));
         assert!(close(at, DVec3::ONE, 2e-3), "F(θ_r^dp) is {at} with x = {x}");
     }
 }
@@ -80,14 +80,14 @@ fn both_sides_are_averaged_and_the_outward_one_fades() {
     let (low, high) = (2.0_f64.ln_1p(), 8.0_f64.ln_1p());
     let quarter = low + 0.25 * (high - low);
     assert!(
-        (model.g().at(0.03).x - quarter).abs() < 1e-12,
+        (model.g().at(0.03 * 0.03).x - quarter).abs() < 1e-12,
         "{}",
-        model.g().at(0.03)
+        model.g().at(0.03 * 0.03)
     );
     assert!(
-        (model.g().at(0.06).x - low).abs() < 1e-12,
+        (model.g().at(0.06 * 0.06).x - low).abs() < 1e-12,
         "{}",
-        model.g().at(0.06)
+        model.g().at(0.06 * 0.06)
     );
     assert_eq!(model.g().range(), (0.0, 1.0));
 }
