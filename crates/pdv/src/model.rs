@@ -7,6 +7,9 @@ pub trait Model: Brdf {
     /// range of a factor.
     fn extrapolated(&self, incident: DVec3, exitant: DVec3) -> bool;
 
+    /// What it is and how it was made, in words, to follow "it is": no capital, no full stop.
+    fn about(&self) -> String;
+
     /// The one-dimensional factors, for people and files.
     fn factors(&self) -> Vec<FactorTable>;
 }

@@ -155,6 +155,29 @@ impl Model for Planes {
         !self.lobe.covers(theta_h) || self.f.extrapolated(theta_d)
     }
 
+    fn about(&self) -> String {
+        let Shape {
+            scale,
+            diffuse,
+            shadowing,
+            darkening,
+        } = self.shape();
+        let why = self.error.map_or_else(
+            || "a shape that serves most materials, for there are no two sides to compare".to_owned(),
+            |error| {
+                format!(
+                    "the shape with which its sides predict each other best, to {error:.4} in ln(f cos + 0.1)"
+                )
+            },
+        );
+        format!(
+            "the reciprocal model of {} sides of planes and an arc, with {why}: s = {scale:.3} 1/sr, q = {diffuse:.2}, \
+             a = {shadowing:.2}, κ = {darkening:.2}; {} readings dropped",
+            self.lobe.rows().count(),
+            self.dropped
+        )
+    }
+
     fn factors(&self) -> Vec<FactorTable> {
         let degrees = |(theta, value): (f64, DVec3)| (theta.to_degrees(), value);
         let f = FactorTable {

@@ -145,6 +145,15 @@ impl Model for Separable {
         self.f.extrapolated(sin_o) || self.g.extrapolated(d_p)
     }
 
+    fn about(&self) -> String {
+        format!(
+            "the separable model of a plane at {:.2}° and an arc that crosses it at d_p = {:.4}; {} readings dropped",
+            self.theta_r.to_degrees(),
+            self.intersection,
+            self.dropped
+        )
+    }
+
     fn factors(&self) -> Vec<FactorTable> {
         let f = self
             .f

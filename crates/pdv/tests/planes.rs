@@ -207,6 +207,11 @@ fn one_reading_of_each_is_enough() {
     let one = plane(&gold, 30.0, 9)[7];
     let model = Planes::from_observations(&[vec![one]], &arc(&gold, 1, 0.0)).unwrap();
     assert_eq!((model.shape(), model.error()), (Shape::DEFAULT, None));
+    assert!(
+        model.about().contains("no two sides to compare"),
+        "{}",
+        model.about()
+    );
     let (incident, exitant) = at(&one);
     assert!(off(model.eval(incident, exitant), one.rgb) < 1e-6);
     let peak = Observation::of(&gold, 0.5, 0.0).unwrap();

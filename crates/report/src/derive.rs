@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use brdf::Brdf;
-use pdv::{Model, Observation, Separable};
+use pdv::{Model, Observation, Planes, Separable};
 use rig::{Port, RigFile};
 use sweep::{Job, Sweep};
 
@@ -27,17 +27,20 @@ impl Sweeps {
         }
     }
 
-    /// The model that the job asks for: the separable one is made of the first plane and the arc.
+    /// The model that the job asks for: all but "planes" are made of the first plane and the arc.
     ///
     /// # Errors
     /// Too few usable readings.
     pub(crate) fn model(&self, job: &Job) -> Result<Box<dyn Model>, pdv::Error> {
-        match job.model {
+        let first = &self.planes[..self.planes.len().min(1)];
+        Ok(match job.model {
             sweep::Model::Separable => {
-                let plane = self.planes.first().map(Vec::as_slice).unwrap_or_default();
-                Ok(Box::new(Separable::from_observations(plane, &self.arc)?))
+                let plane = first.first().map(Vec::as_slice).unwrap_or_default();
+                Box::new(Separable::from_observations(plane, &self.arc)?)
             }
-        }
+            sweep::Model::Reciprocal => Box::new(Planes::from_observations(first, &self.arc)?),
+            sweep::Model::Planes => Box::new(Planes::from_observations(&self.planes, &self.arc)?),
+        })
     }
 }
 

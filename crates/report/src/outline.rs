@@ -111,6 +111,12 @@ fn notes(report: &Report) -> Vec<String> {
         .iter()
         .map(|why| format!("There is no reconstruction: {why}."))
         .collect();
+    notes.extend(
+        report
+            .model
+            .iter()
+            .map(|about| format!("The reconstruction is {about}.")),
+    );
     notes.push(
         "The pictures show a sphere lit by two lamps; each channel c is shown as 1 − exp(−1.57 c) through the sRGB curve. preview.exr holds the values themselves.".to_owned(),
     );

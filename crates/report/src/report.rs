@@ -26,6 +26,8 @@ pub struct Report {
     pub errors: Option<Comparison>,
     /// Why there is no reconstruction, where there is none.
     pub no_model: Option<String>,
+    /// How the reconstruction was made.
+    pub model: Option<String>,
     /// What the plan left out and why.
     pub left_out: Vec<LeftOut>,
 }
@@ -79,6 +81,7 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
         checks: check(&run, &job, &sweeps, model.as_deref()),
         errors,
         no_model,
+        model: model.as_ref().map(|model| model.about()),
         left_out: header.plan.left_out.clone(),
         run,
     };

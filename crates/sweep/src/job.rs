@@ -43,4 +43,9 @@ pub enum Model {
     /// The paper's product F(θ_r)·G(d_p) in the logarithmic domain (Eq. 3).
     #[default]
     Separable,
+    /// The first plane and the arc, reciprocally: a lobe over θ_h whose peak over θ_d is read on the arc, and a
+    /// diffuse floor.
+    Reciprocal,
+    /// The same of all planes and the arc, interpolated between the planes.
+    Planes,
 }

@@ -79,7 +79,7 @@ fn bad_input_is_named_with_line_key_and_range() {
         ),
         (
             format!("{plane}[reconstruction]\nmodel = \"magic\""),
-            "job.toml, line 5: model: unknown variant `magic`, expected `separable`",
+            "job.toml, line 5: model: unknown variant `magic`, expected one of `separable`, `reciprocal`, `planes`",
         ),
     ];
     for (text, expected) in table {
