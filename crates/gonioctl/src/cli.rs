@@ -112,3 +112,25 @@ pub(crate) enum Format {
     /// The readings, readings.csv.
     Csv,
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn arguments_are_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn run_takes_a_job_or_a_run_directory_and_not_both() {
+        let parse = |arguments: &[&str]| Cli::try_parse_from([&["gonioctl", "run"], arguments].concat());
+        assert!(parse(&["job.toml"]).is_ok());
+        assert!(parse(&["--resume", "runs/1"]).is_ok());
+        assert!(parse(&[]).is_err());
+        assert!(parse(&["job.toml", "--resume", "runs/1"]).is_err());
+        assert!(parse(&["--resume", "runs/1", "--out", "elsewhere"]).is_err());
+    }
+}

@@ -49,7 +49,13 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             output,
         } => {
             let task = match (&job, &resume) {
-                (_, Some(directory)) => Task::Resume(directory),
+                (_, Some(directory)) => {
+                    anyhow::ensure!(
+                        rig.rig.is_none(),
+                        "--rig: a run goes on with the rig file that it began with"
+                    );
+                    Task::Resume(directory)
+                }
                 (Some(job), None) => Task::New {
                     job,
                     rig: rig.rig.as_deref(),

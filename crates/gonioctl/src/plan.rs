@@ -1,9 +1,8 @@
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use goniod::Order;
 use serde_json::json;
-use sweep::Plan;
+use sweep::{Plan, Sweep};
 
 use crate::print;
 use crate::progress::clock;
@@ -46,19 +45,18 @@ fn step(step: &sweep::Step) -> serde_json::Value {
 
 /// A plan for people: each sweep in a line, then what is left out.
 fn list(plan: &Plan) -> std::io::Result<()> {
-    let mut sweeps: BTreeMap<usize, (String, usize, f64)> = BTreeMap::new();
-    let mut order: Vec<String> = Vec::new();
+    let mut sweeps: Vec<(Sweep, usize, f64)> = Vec::new();
     for step in &plan.steps {
-        let name = step.sweep.to_string();
-        let place = order.iter().position(|known| *known == name).unwrap_or_else(|| {
-            order.push(name.clone());
-            order.len() - 1
-        });
-        let sweep = sweeps.entry(place).or_insert((name, 0, 0.0));
-        sweep.1 += 1;
-        sweep.2 += step.seconds;
+        match sweeps.last_mut().filter(|sweep| sweep.0 == step.sweep) {
+            Some((_, readings, seconds)) => {
+                *readings += 1;
+                *seconds += step.seconds;
+            }
+            None => sweeps.push((step.sweep, 1, step.seconds)),
+        }
     }
-    for (name, readings, seconds) in sweeps.into_values() {
+    for (sweep, readings, seconds) in sweeps {
+        let name = sweep.to_string();
         print::line(format_args!(
             "{name:<10} {readings:>5} readings {:>12}",
             clock(seconds)

@@ -5,6 +5,7 @@ use std::time::Instant;
 use capture::{Command, Event, Outcome};
 use goniod::{DaemonError, Ended, Order};
 use serde_json::json;
+use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::watch;
 
 use crate::progress::{Progress, clock};
@@ -35,8 +36,8 @@ pub(crate) fn run(task: &Task<'_>, json: bool) -> anyhow::Result<ExitCode> {
     let ended = runtime.block_on(async {
         let (sender, control) = watch::channel(Command::Run);
         // Before anything can move.
-        let interrupts = tokio::signal::unix::signal(tokio::signal::unix::SignalKind::interrupt())?;
-        tokio::spawn(obey(interrupts, sender));
+        let signals = Signals::listen()?;
+        tokio::spawn(obey(signals, sender));
         capture(task, control).await
     })?;
     let wall_s = begun.elapsed().as_secs_f64();
@@ -49,8 +50,33 @@ pub(crate) fn run(task: &Task<'_>, json: bool) -> anyhow::Result<ExitCode> {
     Ok(exit::code(ended.status()))
 }
 
-/// The first Ctrl-C finishes the reading and holds, the second stops at once.
-async fn obey(mut interrupts: tokio::signal::unix::Signal, sender: watch::Sender<Command>) {
+/// What asks for an end: Ctrl-C, `kill`, and a terminal that was closed.
+struct Signals {
+    interrupt: Signal,
+    terminate: Signal,
+    hang_up: Signal,
+}
+
+impl Signals {
+    fn listen() -> std::io::Result<Self> {
+        Ok(Self {
+            interrupt: signal(SignalKind::interrupt())?,
+            terminate: signal(SignalKind::terminate())?,
+            hang_up: signal(SignalKind::hangup())?,
+        })
+    }
+
+    async fn next(&mut self) {
+        tokio::select! {
+            _ = self.interrupt.recv() => {}
+            _ = self.terminate.recv() => {}
+            _ = self.hang_up.recv() => {}
+        }
+    }
+}
+
+/// The first signal finishes the reading and holds, the second stops at once.
+async fn obey(mut signals: Signals, sender: watch::Sender<Command>) {
     let words = [
         (
             Command::Stop,
@@ -59,9 +85,7 @@ async fn obey(mut interrupts: tokio::signal::unix::Signal, sender: watch::Sender
         (Command::Estop, "emergency stop"),
     ];
     for (command, word) in words {
-        if interrupts.recv().await.is_none() {
-            return;
-        }
+        signals.next().await;
         print::say(word);
         // Nobody listens any more once the capture has ended.
         let _ = sender.send(command);

@@ -5,6 +5,9 @@ const SIZE: (f64, f64) = (640.0, 400.0);
 /// Left, top, right, bottom margin for labels.
 const MARGIN: [f64; 4] = [64.0, 14.0, 14.0, 48.0];
 
+/// Room that a logarithmic axis leaves at either end, as a factor.
+const MARGIN_LOG: f64 = 1.25;
+
 /// One axis of a plot.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Axis {
@@ -39,8 +42,8 @@ pub(crate) struct Series {
 }
 
 impl Axis {
-    /// An axis that holds all values, rounded outwards to decades where it is logarithmic; for a logarithmic one,
-    /// values ≤ 0 count for nothing and at most `decades` are shown, from the top.
+    /// An axis that holds all values; a logarithmic one spans at least one decade and at most `decades`, from the
+    /// top, and values ≤ 0 count for nothing.
     pub(crate) fn around(
         label: &'static str,
         decades: Option<i32>,
@@ -58,9 +61,9 @@ impl Axis {
             None if low == high => [low - 0.5, high + 0.5],
             None => [low, high],
             Some(decades) => {
-                let top = high.log10().ceil();
-                let bottom = low.log10().floor().max(top - f64::from(decades));
-                [10_f64.powf(bottom.min(top - 1.0)), 10_f64.powf(top)]
+                let high = high * MARGIN_LOG;
+                let low = (low / MARGIN_LOG).max(high * 10_f64.powi(-decades));
+                [low.min(high / 10.0), high]
             }
         };
         Self { label, log, bounds }
@@ -78,8 +81,16 @@ impl Axis {
     fn ticks(&self) -> Vec<f64> {
         let [low, high] = self.bounds;
         if self.log {
-            let (first, last) = (low.log10().ceil() as i32, high.log10().floor() as i32);
-            return (first..=last).map(|decade| 10_f64.powi(decade)).collect();
+            let steps: &[f64] = if high / low > 300.0 {
+                &[1.0]
+            } else {
+                &[1.0, 2.0, 5.0]
+            };
+            let decades = low.log10().floor() as i32..=high.log10().ceil() as i32;
+            return decades
+                .flat_map(|decade| steps.iter().map(move |step| step * 10_f64.powi(decade)))
+                .filter(|tick| (low..=high).contains(tick))
+                .collect();
         }
         // 1, 2 or 5 times a power of ten, such that there are at most nine.
         let raw = (high - low) / 8.0;
@@ -178,11 +189,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn log_axis_spans_whole_decades_and_ignores_what_it_cannot_show() {
+    fn log_axis_holds_all_values_that_it_can_show() {
         let axis = Axis::around("f", Some(6), [0.0, f64::NAN, 0.02, 35.0].into_iter());
-        assert!((axis.bounds[0] / 0.01 - 1.0).abs() < 1e-12 && (axis.bounds[1] / 100.0 - 1.0).abs() < 1e-12);
-        assert_eq!(axis.ticks().len(), 5);
+        assert!(axis.place(0.02).is_some() && axis.place(35.0).is_some());
         assert_eq!(axis.place(0.0), None);
+        assert_eq!(axis.ticks(), [0.1, 1.0, 10.0]);
+        let narrow = Axis::around("f", Some(6), [0.9, 1.1].into_iter());
+        assert!(narrow.ticks().len() >= 2, "{:?}", narrow.ticks());
+        let wide = Axis::around("f", Some(2), [1e-9, 1.0].into_iter());
+        assert_eq!(wide.place(1e-9), None, "only the upper decades are shown");
     }
 
     #[test]

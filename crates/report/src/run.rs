@@ -215,3 +215,110 @@ pub(crate) fn flag_name(flag: Flag) -> &'static str {
         Flag::Retried => "retried",
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use arms::Pose;
+    use rig::{Counts, Exposure, Gain};
+    use sweep::{Plan, Sweep};
+
+    use super::*;
+
+    fn header() -> Header {
+        Header {
+            run: "01".into(),
+            version: "0".into(),
+            job: "abc".into(),
+            rig: String::new(),
+            plan: Plan {
+                steps: Vec::new(),
+                left_out: Vec::new(),
+                overhead_s: 0.0,
+            },
+            started: "2026-01-01T00:00:00Z".into(),
+        }
+    }
+
+    fn begin(device_ticks: u64) -> Record {
+        Record::Begin {
+            identities: Vec::new(),
+            device_ticks,
+            at: String::new(),
+        }
+    }
+
+    fn reading(sweep: Sweep, device_ticks: u64, flags: Vec<Flag>) -> Record {
+        Record::Reading(Reading {
+            step: 0,
+            attempt: 0,
+            accepted: flags.is_empty(),
+            sweep,
+            lamp: sweep != Sweep::Dark,
+            goal: Pose::default(),
+            measured: Pose::default(),
+            counts: Counts {
+                rgb: [0; 3],
+                monitor: 0,
+                exposure: Exposure {
+                    integration_us: 100,
+                    gain: Gain::X1,
+                },
+                saturated: false,
+                sequence: 1,
+                ticks: 0,
+                temperature_c: 25,
+            },
+            device_ticks,
+            retries: 2,
+            flags,
+        })
+    }
+
+    #[test]
+    fn seconds_belong_to_what_they_were_spent_on_and_a_pause_to_nothing() {
+        let stopped = Record::End {
+            outcome: Outcome::Stopped,
+            device_ticks: Some(600_000),
+            at: "later".into(),
+        };
+        let records = [
+            Record::Header(header()),
+            begin(100_000),
+            reading(Sweep::Dark, 200_000, vec![]),
+            reading(Sweep::Plane(1), 500_000, vec![Flag::Saturated]),
+            stopped,
+            begin(9_000_000),
+            reading(Sweep::Plane(1), 9_100_000, vec![]),
+        ];
+        let run = Run::new(&header(), &records[..5]);
+        assert_eq!((run.state, run.exit_status), (State::Stopped, Some(4)));
+        let run = Run::new(&header(), &records);
+        assert_eq!(
+            (run.state, run.exit_status),
+            (State::Interrupted, None),
+            "it has not ended again"
+        );
+        assert_eq!(run.executions, 2);
+        let seconds = |phase: &str| (run.seconds.phases[phase] * 1e5).round();
+        assert_eq!(
+            [seconds("dark"), seconds("plane 1"), seconds("end")],
+            [1e5, 4e5, 1e5]
+        );
+        assert!((run.seconds.total - 6.0).abs() < 1e-9, "{}", run.seconds.total);
+        assert_eq!(
+            (run.readings.taken, run.readings.accepted, run.retries),
+            (3, 2, 6)
+        );
+        assert_eq!(run.flags["saturated"], 1);
+    }
+
+    #[test]
+    fn given_texts_are_hashed() {
+        // The example of FIPS 180-2, appendix B.1.
+        let hash = Run::new(&header(), &[]).job.sha256;
+        assert_eq!(
+            hash,
+            "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
+        );
+    }
+}
