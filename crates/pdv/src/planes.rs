@@ -47,16 +47,7 @@ impl Planes {
     /// The model of some shape.
     pub(crate) fn new(sweeps: &Sweeps, shape: Shape) -> Result<Self, Error> {
         let black = sweeps.least.cmpeq(DVec3::ZERO);
-        let smallest = sweeps
-            .points()
-            .map(|p| p.rgb / shape.falloff(p.cos_i, p.cos_o))
-            .fold(DVec3::INFINITY, DVec3::min);
-        let diffuse = shape.diffuse * smallest;
-        let excess = Excess {
-            shape,
-            diffuse,
-            least: DVec3::select(black, DVec3::ZERO, sweeps.least.max(1e-4 * diffuse)),
-        };
+        let excess = Excess::new(shape, sweeps.least, sweeps.points());
         let log = |p: &Point| excess.log(p.rgb, p.cos_i, p.cos_o);
         let on_peak = sweeps.arc.iter().all(|p| p.theta_h.abs() < ON_PEAK);
         let mut f = Factor::new("F", sweeps.arc.iter().map(|p| (p.theta_d, log(p))))?;

@@ -1,6 +1,8 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use crate::sweeps::Point;
+
 /// Smallest cosine in the shadowing term, so that it stays finite at the horizon.
 const COS_MIN: f64 = 1e-4;
 
@@ -51,11 +53,42 @@ pub(crate) struct Excess {
     pub(crate) diffuse: DVec3,
     /// The least that counts as above the floor, sr⁻¹; 0 in a black channel.
     pub(crate) least: DVec3,
+    /// The largest G·F, so that a ratio of two readings near the floor does not run away where F is large.
+    pub(crate) most: DVec3,
 }
 
 impl Excess {
-    /// Exponents are kept below this, so that nothing overflows.
-    const LOG_MAX: f64 = 60.0;
+    /// What lies this share of the floor above it is not told from it: a ratio of less would be one of noise.
+    const TOLD: f64 = 0.01;
+    /// How far, as a factor, the lobe may rise above everything that was read.
+    const RISE: f64 = 2.0;
+
+    /// The floor of readings; `least` is what can be told from black, 0 in a black channel.
+    pub(crate) fn new<'a>(
+        shape: Shape,
+        least: DVec3,
+        readings: impl Iterator<Item = &'a Point> + Clone,
+    ) -> Self {
+        let smallest = readings
+            .clone()
+            .map(|p| p.rgb / shape.falloff(p.cos_i, p.cos_o))
+            .fold(DVec3::INFINITY, DVec3::min);
+        let diffuse = shape.diffuse * smallest;
+        let black = least.cmpeq(DVec3::ZERO);
+        let excess = Self {
+            shape,
+            diffuse,
+            least: DVec3::select(black, DVec3::ZERO, least.max(Self::TOLD * diffuse)),
+            most: DVec3::INFINITY,
+        };
+        let most = readings
+            .map(|p| excess.log(p.rgb, p.cos_i, p.cos_o))
+            .fold(DVec3::ZERO, DVec3::max);
+        Self {
+            most: most.map(|log| (Self::RISE * log.exp_m1()).ln_1p()),
+            ..excess
+        }
+    }
 
     /// G·F of a reflectance: ln(1 + excess/(s V)).
     #[inline]
@@ -67,7 +100,7 @@ impl Excess {
     /// The reflectance of a G·F.
     #[inline]
     pub(crate) fn reflectance(&self, log: DVec3, cos_i: f64, cos_o: f64) -> DVec3 {
-        let lobe = log.min(DVec3::splat(Self::LOG_MAX)).map(f64::exp_m1);
+        let lobe = log.min(self.most).map(f64::exp_m1);
         self.diffuse * self.shape.falloff(cos_i, cos_o) + lobe * self.shape.lobe_scale(cos_i, cos_o)
     }
 }

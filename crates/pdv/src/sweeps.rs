@@ -112,7 +112,7 @@ impl Sweeps {
         })
     }
 
-    pub(crate) fn points(&self) -> impl Iterator<Item = &Point> {
+    pub(crate) fn points(&self) -> impl Iterator<Item = &Point> + Clone {
         self.sides.iter().flat_map(|side| &side.points).chain(&self.arc)
     }
 }

@@ -87,24 +87,23 @@ fn gives_back_what_it_was_made_of() {
     }
 }
 
-/// The mean over the fitted materials is what the study file of the models measures; here every tenth.
+/// All materials for the few readings, every tenth for the many, at few pairs.
 #[test]
 fn comes_near_the_fitted_materials() {
-    for (planes, readings, along, bar) in [
-        (&[30.0][..], 90, 90, 0.0012),
-        (&[20.0, 45.0, 70.0], 12, 12, 0.0012),
-        (&[3.0, 15.0, 30.0, 45.0, 60.0, 70.0, 80.0], 90, 90, 0.0005),
+    for (planes, readings, along, step, bar) in [
+        (&[30.0][..], 90, 90, 4, 0.0012),
+        (&[20.0, 45.0, 70.0], 13, 9, 1, 0.0012),
+        (&[5.0, 20.0, 35.0, 50.0, 65.0, 75.0, 82.0], 90, 90, 10, 0.0005),
     ] {
         let draw = Draw {
-            pairs: 3000,
+            pairs: 1000,
             ..Draw::default()
         };
         let male: Vec<f64> = Fitted::all()
-            .step_by(10)
+            .step_by(step)
             .filter_map(|(_, material)| {
-                compare(&material, &[&model(&material, planes, readings, along)], &draw)[0]
-                    .overall
-                    .male
+                let model = model(&material, planes, readings, along);
+                compare(&material, &[&model], &draw)[0].overall.male
             })
             .collect();
         let mean = male.iter().sum::<f64>() / male.len() as f64;
@@ -360,7 +359,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn prop_is_finite_and_not_negative_whatever_was_read(
+    fn prop_is_finite_and_bounded_whatever_was_read(
         planes in (sweep(0.0), sweep(0.6), sweep(1.5)),
         along in prop::collection::vec((0.0..1.57_f64, -12.0..7.0_f64), 0..6),
         pairs in prop::collection::vec((direction(), direction()), 50),
@@ -369,12 +368,16 @@ proptest! {
             .into_iter()
             .map(|(theta_r, log)| Observation { theta_r, deviation: 0.0, rgb: DVec3::splat(10_f64.powf(log)) })
             .collect();
-        let Ok(model) = Planes::from_observations(&[planes.0, planes.1, planes.2], &along) else {
+        let Ok(model) = Planes::from_observations(&[planes.0.clone(), planes.1.clone(), planes.2.clone()], &along) else {
             return Err(TestCaseError::reject("nothing to make a model of"));
         };
+        // Shadowing may brighten a lobe by (1/0.03)², and what lies by the floor may be off by a factor of 2.
+        let sweeps = [&planes.0, &planes.1, &planes.2, &along];
+        let brightest = sweeps.into_iter().flatten().map(|o| o.rgb.max_element()).fold(0.0, f64::max);
         for (incident, exitant) in pairs.into_iter().chain([(DVec3::Z, DVec3::Z), (DVec3::X, DVec3::NEG_X)]) {
             let f = model.eval(incident, exitant);
             prop_assert!(f.is_finite() && f.min_element() >= 0.0, "{} at {}, {}", f, incident, exitant);
+            prop_assert!(f.max_element() <= 2300.0 * brightest, "{} at {}, {}", f, incident, exitant);
         }
     }
 
