@@ -59,7 +59,7 @@ pub(crate) struct Excess {
 
 impl Excess {
     /// What lies this share of the floor above it is not told from it: a ratio of less would be one of noise.
-    const TOLD: f64 = 0.01;
+    const TOLD: f64 = 1e-3;
     /// How far, as a factor, the lobe may rise above everything that was read.
     const RISE: f64 = 2.0;
 
