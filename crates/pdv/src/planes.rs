@@ -154,7 +154,7 @@ impl Model for Planes {
             darkening,
         } = self.shape();
         let why = self.error.map_or_else(
-            || "a shape that serves most materials, for there are no two sides to compare".to_owned(),
+            || "a moderate shape, taken untested, for there are no two sides to compare".to_owned(),
             |error| {
                 format!(
                     "the shape with which its sides predict each other best, to {error:.4} in ln(f cos + 0.1)"

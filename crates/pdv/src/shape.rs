@@ -20,7 +20,7 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Taken where the readings cannot tell: the one that serves the fitted MERL materials best as a whole.
+    /// Taken where the readings cannot tell, with one side of one plane: moderate in everything, and not fitted.
     pub const DEFAULT: Self = Self {
         scale: 1.0,
         diffuse: 0.9,
