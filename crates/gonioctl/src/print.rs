@@ -13,7 +13,7 @@ pub(crate) fn line(text: impl std::fmt::Display) -> io::Result<()> {
 /// Prints a value as indented JSON on stdout.
 ///
 /// # Errors
-/// As [`line`].
+/// As [`line()`].
 pub(crate) fn json(value: &impl Serialize) -> io::Result<()> {
     line(serde_json::to_string_pretty(value)?)
 }
