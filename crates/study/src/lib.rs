@@ -1,6 +1,6 @@
 //! Error against run time, and the paper's evaluation.
 //!
-//! A study file says which materials are reconstructed from which readings and how they are judged; [`run`] gives
+//! A study file says which materials are reconstructed from which readings and how they are judged; [`run()`] gives
 //! one CSV row for each material and angle, and a [`Summary`]. What is here so far needs no rig: readings are taken
 //! from the BRDF itself.
 
