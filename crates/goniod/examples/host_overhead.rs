@@ -41,5 +41,8 @@ async fn measure(job: &Path, clock: &str) -> Result<f64, Box<dyn Error>> {
     let (_operator, control) = watch::channel(Command::Run);
     let ended = goniod::run(&order, out.path(), control, &mut |_| {}).await?;
     let run = &ended.report.run;
+    if ended.outcome != capture::Outcome::Done {
+        return Err(format!("the run ended as {:?}", ended.outcome).into());
+    }
     Ok(run.seconds.total * 1e3 / run.readings.taken as f64)
 }
