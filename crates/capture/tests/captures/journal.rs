@@ -120,17 +120,19 @@ fn a_second_writer_is_kept_out_and_a_reader_is_not() {
     assert!(FileJournal::open(&path).is_ok());
 }
 
+fn start_of_last_line(text: &[u8]) -> usize {
+    let before = &text[..text.len() - 1];
+    let end_of_the_one_before = before.iter().rposition(|&byte| byte == b'\n');
+    end_of_the_one_before.expect("a journal has more than one line") + 1
+}
+
 #[test]
 fn a_tail_torn_at_any_byte_costs_the_last_record_alone() {
     let directory = TempDir::new().unwrap();
     let path = directory.path().join("journal");
     let written = write(&path);
     let whole = std::fs::read(&path).unwrap();
-    let last = whole[..whole.len() - 1]
-        .iter()
-        .rposition(|&byte| byte == b'\n')
-        .unwrap()
-        + 1;
+    let last = start_of_last_line(&whole);
     for end in last..whole.len() {
         std::fs::write(&path, &whole[..end]).unwrap();
         assert_eq!(
@@ -152,11 +154,7 @@ fn any_damaged_byte_of_the_last_line_is_noticed() {
     let path = directory.path().join("journal");
     let written = write(&path);
     let whole = std::fs::read(&path).unwrap();
-    let last = whole[..whole.len() - 1]
-        .iter()
-        .rposition(|&byte| byte == b'\n')
-        .unwrap()
-        + 1;
+    let last = start_of_last_line(&whole);
     for at in last..whole.len() {
         let mut damaged = whole.clone();
         damaged[at] ^= 0x15;
