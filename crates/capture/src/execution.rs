@@ -7,7 +7,8 @@ use tokio::sync::watch;
 use crate::clock::DeviceClock;
 use crate::exposure::Ranging;
 use crate::progress::Progress;
-use crate::{CaptureError, Command, Event, Flag, Journal, Reading, Record, State, mechanics};
+use crate::run::Ask;
+use crate::{CaptureError, Command, Event, Flag, Journal, Reading, Record, State, closed, mechanics};
 
 mod shutdown;
 
@@ -23,12 +24,14 @@ const TICKS_PER_S: f64 = 1e5;
 
 /// One execution of a plan, from who-are-you to lamp off.
 pub(crate) struct Execution<'a, R: Rig> {
-    plan: &'a Plan,
+    plan: Plan,
     file: &'a RigFile,
     drive: &'a mut Drive<R>,
     journal: &'a mut dyn Journal,
     control: watch::Receiver<Command>,
     on_event: &'a mut (dyn FnMut(Event) + Send),
+    /// Who says what is measured once every step is done.
+    ask: Option<&'a mut Ask<'a>>,
     /// Whether each step has an accepted reading.
     done: Vec<bool>,
     /// Readings of each step so far, accepted or not.
@@ -47,12 +50,13 @@ pub(crate) struct Execution<'a, R: Rig> {
 
 impl<'a, R: Rig> Execution<'a, R> {
     pub(crate) fn new(
-        plan: &'a Plan,
+        plan: Plan,
         file: &'a RigFile,
         drive: &'a mut Drive<R>,
         journal: &'a mut dyn Journal,
         control: watch::Receiver<Command>,
         on_event: &'a mut (dyn FnMut(Event) + Send),
+        ask: Option<&'a mut Ask<'a>>,
     ) -> Self {
         let mut done = vec![false; plan.steps.len()];
         let mut attempts = vec![0; plan.steps.len()];
@@ -68,7 +72,7 @@ impl<'a, R: Rig> Execution<'a, R> {
                 ranging.learn(reading);
             }
         }
-        let progress = Progress::new(plan, |step| done[step]);
+        let progress = Progress::new(&plan, |step| done[step]);
         Self {
             plan,
             file,
@@ -76,6 +80,7 @@ impl<'a, R: Rig> Execution<'a, R> {
             journal,
             control,
             on_event,
+            ask,
             done,
             attempts,
             ranging,
@@ -97,16 +102,46 @@ impl<'a, R: Rig> Execution<'a, R> {
         self.drive.engage_all().await?;
         self.state(State::Running);
         self.report_progress();
-        let plan = self.plan;
-        for step in &plan.steps {
-            if self.done[step.index] {
-                self.on_path = false;
-                continue;
+        let mut next = 0;
+        loop {
+            while let Some(step) = self.plan.steps.get(next).cloned() {
+                next += 1;
+                if self.done[step.index] {
+                    self.on_path = false;
+                    continue;
+                }
+                self.obey().await?;
+                self.step(&step).await?;
+            }
+            if !self.extend().await? {
+                return Ok(());
+            }
+        }
+    }
+
+    /// Asks what else is to be measured, looking after the rig meanwhile, and records the answer. Returns whether
+    /// steps were added.
+    async fn extend(&mut self) -> Result<bool, Interrupt<R::Error>> {
+        let Some(ask) = self.ask.as_mut().filter(|_| !closed(self.journal.records())) else {
+            return Ok(false);
+        };
+        let mut thinking = ask(self.journal.records());
+        let extension = loop {
+            if let Ok(extension) = tokio::time::timeout(self.look_every(), &mut thinking).await {
+                break extension;
             }
             self.obey().await?;
-            self.step(step).await?;
-        }
-        Ok(())
+            self.mark = self.look().await?;
+        };
+        self.journal.append(&Record::Extension(extension.clone()))?;
+        let added = !extension.steps.is_empty();
+        let steps = self.plan.steps.len() + extension.steps.len();
+        self.done.resize(steps, false);
+        self.attempts.resize(steps, 0);
+        self.progress.extend(&extension.steps);
+        self.plan.steps.extend(extension.steps);
+        self.report_progress();
+        Ok(added)
     }
 
     /// Asks every device who it is and when, and records it.
@@ -318,7 +353,7 @@ fn last_ticks(records: &[Record]) -> Option<u64> {
         Record::Reading(reading) => Some(reading.device_ticks),
         Record::Begin { device_ticks, .. } => Some(*device_ticks),
         Record::End { device_ticks, .. } => *device_ticks,
-        Record::Header(_) => None,
+        Record::Header(_) | Record::Extension(_) => None,
     })
 }
 

@@ -1,6 +1,6 @@
 use rig::Identity;
 use serde::{Deserialize, Serialize};
-use sweep::Plan;
+use sweep::{Plan, Step};
 
 use crate::{JournalError, Reading};
 
@@ -37,6 +37,41 @@ pub enum Outcome {
     },
 }
 
+/// Steps that were added to a plan while it ran, and why; without steps it is the last word: nothing more is measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Extension {
+    /// Their indices go on from those before.
+    pub steps: Vec<Step>,
+    /// Why, in words.
+    pub why: String,
+    /// MALE that was expected of a reconstruction from the readings so far.
+    pub expected_male: Option<f64>,
+}
+
+/// The plan of a journal with all its extensions; `None` without a header.
+pub fn extended_plan(records: &[Record]) -> Option<Plan> {
+    let Some(Record::Header(header)) = records.first() else {
+        return None;
+    };
+    let mut plan = header.plan.clone();
+    for record in records {
+        if let Record::Extension(extension) = record {
+            plan.steps.extend_from_slice(&extension.steps);
+        }
+    }
+    Some(plan)
+}
+
+/// Whether a journal holds the last word on what is measured: its plan is not open, or an extension without steps
+/// closed it.
+pub fn closed(records: &[Record]) -> bool {
+    records.iter().rev().any(|record| match record {
+        Record::Header(header) => !header.plan.open,
+        Record::Extension(extension) => extension.steps.is_empty(),
+        _ => false,
+    })
+}
+
 /// One line of the journal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", tag = "record")]
@@ -54,6 +89,8 @@ pub enum Record {
     },
     /// A reading was taken.
     Reading(Reading),
+    /// Steps were added to the plan.
+    Extension(Extension),
     /// An execution ended.
     End {
         /// How.

@@ -1,4 +1,4 @@
-use sweep::{Plan, Sweep};
+use sweep::{Plan, Step, Sweep};
 
 /// Seconds of plan that count like measured ones, against a jumpy start.
 const PRIOR_S: f64 = 5.0;
@@ -35,10 +35,15 @@ impl Progress {
             warm_up_s,
             sweeps: Vec::new(),
         };
-        for step in left() {
-            progress.pace(step.sweep).left_s += step.seconds;
-        }
+        left().for_each(|step| progress.pace(step.sweep).left_s += step.seconds);
         progress
+    }
+
+    /// Steps were added to the plan.
+    pub(crate) fn extend(&mut self, steps: &[Step]) {
+        for step in steps {
+            self.pace(step.sweep).left_s += step.seconds;
+        }
     }
 
     /// The lamp is warm.

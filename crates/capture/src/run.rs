@@ -1,12 +1,20 @@
 use std::future::Future;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::pin::Pin;
 use std::task::Poll;
 
 use rig::{Drive, Rig};
 use tokio::sync::watch;
 
 use crate::execution::{Execution, Interrupt};
-use crate::{CaptureError, Command, Event, Journal, Outcome, Record, State};
+use crate::{CaptureError, Command, Event, Extension, Journal, Outcome, Record, State, extended_plan};
+
+/// Says what else is to be measured, from the records so far, once every step of the plan is done. It may take its
+/// time: the rig is looked after meanwhile.
+pub type Ask<'a> = dyn FnMut(&[Record]) -> Thinking + Send + 'a;
+
+/// The answer in the making.
+pub type Thinking = Pin<Box<dyn Future<Output = Extension> + Send>>;
 
 /// Runs the plan in a journal's header on a rig, or goes on with it: steps that have an accepted reading are not
 /// measured again.
@@ -33,12 +41,41 @@ pub async fn run<R: Rig>(
     control: watch::Receiver<Command>,
     on_event: &mut (dyn FnMut(Event) + Send),
 ) -> Result<Outcome, CaptureError> {
-    let Some(Record::Header(header)) = journal.records().first() else {
+    begin(drive, journal, control, on_event, None).await
+}
+
+/// As [`run`], but once every step is done `ask` says what else is to be measured, until it adds no more steps. Its
+/// answers are in the journal, so that a resumed run goes on with them; a journal that holds its last word is not
+/// asked about again.
+///
+/// # Errors
+/// As [`run`].
+///
+/// # Panics
+/// As [`run`].
+pub async fn run_and_ask<R: Rig>(
+    drive: &mut Drive<R>,
+    journal: &mut dyn Journal,
+    control: watch::Receiver<Command>,
+    on_event: &mut (dyn FnMut(Event) + Send),
+    ask: &mut Ask<'_>,
+) -> Result<Outcome, CaptureError> {
+    begin(drive, journal, control, on_event, Some(ask)).await
+}
+
+async fn begin<R: Rig>(
+    drive: &mut Drive<R>,
+    journal: &mut dyn Journal,
+    control: watch::Receiver<Command>,
+    on_event: &mut (dyn FnMut(Event) + Send),
+    ask: Option<&mut Ask<'_>>,
+) -> Result<Outcome, CaptureError> {
+    let Some(plan) = extended_plan(journal.records()) else {
         return Err(CaptureError::NoHeader);
     };
-    let plan = header.plan.clone();
     let file = drive.file().clone();
-    let mut execution = Execution::new(&plan, &file, drive, journal, control.clone(), on_event);
+    let ask = ask.map(|ask| ask as &mut Ask<'_>);
+    let mut execution = Execution::new(plan, &file, drive, journal, control.clone(), on_event, ask);
     let result = guarded(async {
         let result = tokio::select! {
             biased;

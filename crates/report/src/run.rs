@@ -86,6 +86,9 @@ pub struct Run {
     pub retries: u64,
     /// How many readings carry each flag.
     pub flags: BTreeMap<&'static str, usize>,
+    /// Whether nothing can be added to the plan any more.
+    #[serde(skip)]
+    closed: bool,
 }
 
 /// Seconds of rig time.
@@ -143,6 +146,7 @@ impl Run {
                         .add(reading.sweep.to_string(), clock, reading.device_ticks);
                     clock = reading.device_ticks;
                 }
+                Record::Extension(extension) => run.readings.planned += extension.steps.len(),
                 Record::End {
                     outcome,
                     device_ticks,
@@ -154,13 +158,14 @@ impl Run {
                 }
             }
         }
+        run.closed = capture::closed(records);
         run.exit_status = run.state.exit_status();
         run
     }
 
-    /// Whether every step of the plan has an accepted reading.
+    /// Whether every step of the plan has an accepted reading, and no more can be added.
     pub fn complete(&self) -> bool {
-        self.readings.accepted >= self.readings.planned
+        self.closed && self.readings.accepted >= self.readings.planned
     }
 
     fn begun(header: &Header) -> Self {
@@ -183,6 +188,7 @@ impl Run {
             },
             retries: 0,
             flags: BTreeMap::new(),
+            closed: false,
         }
     }
 
@@ -234,6 +240,7 @@ mod tests {
                 steps: Vec::new(),
                 left_out: Vec::new(),
                 overhead_s: 0.0,
+                open: false,
             },
             started: "2026-01-01T00:00:00Z".into(),
         }

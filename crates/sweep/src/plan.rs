@@ -78,6 +78,9 @@ pub struct Plan {
     pub left_out: Vec<LeftOut>,
     /// Seconds before the first step and after the last: warm-up of the lamp.
     pub overhead_s: f64,
+    /// Whether further steps may be added once these are done.
+    #[serde(default)]
+    pub open: bool,
 }
 
 impl Plan {

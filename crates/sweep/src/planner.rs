@@ -66,6 +66,7 @@ pub fn plan(job: &Job, mechanics: &Mechanics) -> Result<Plan, SweepError> {
         steps: draft.steps,
         left_out,
         overhead_s: mechanics.warm_up_s,
+        open: false,
     };
     check(&plan, mechanics, start.pose)?;
     Ok(plan)

@@ -1,6 +1,7 @@
 //! Journals on disk, and whole captures against the in-process rig under a paused clock.
 
 mod bench;
+mod extensions;
 mod faults;
 mod journal;
 mod operator;
