@@ -27,21 +27,33 @@ impl Sweeps {
         }
     }
 
-    /// The model that the job asks for: all but "planes" are made of the first plane and the arc.
+    /// The model that the job asks for.
     ///
     /// # Errors
     /// Too few usable readings.
     pub(crate) fn model(&self, job: &Job) -> Result<Box<dyn Model>, pdv::Error> {
-        let first = &self.planes[..self.planes.len().min(1)];
-        Ok(match job.model {
-            sweep::Model::Separable => {
-                let plane = first.first().map(Vec::as_slice).unwrap_or_default();
-                Box::new(Separable::from_observations(plane, &self.arc)?)
-            }
-            sweep::Model::Reciprocal => Box::new(Planes::from_observations(first, &self.arc)?),
-            sweep::Model::Planes => Box::new(Planes::from_observations(&self.planes, &self.arc)?),
-        })
+        model(job.model, &self.planes, &self.arc)
     }
+}
+
+/// The model of a kind from the observations of planes and arc; one of a single plane is made of the first.
+///
+/// # Errors
+/// Too few usable readings.
+pub fn model(
+    kind: sweep::Model,
+    planes: &[Vec<Observation>],
+    arc: &[Observation],
+) -> Result<Box<dyn Model>, pdv::Error> {
+    let first = &planes[..planes.len().min(1)];
+    Ok(match kind {
+        sweep::Model::Separable => {
+            let plane = first.first().map(Vec::as_slice).unwrap_or_default();
+            Box::new(Separable::from_observations(plane, arc)?)
+        }
+        sweep::Model::Reciprocal => Box::new(Planes::from_observations(first, arc)?),
+        sweep::Model::Planes => Box::new(Planes::from_observations(planes, arc)?),
+    })
 }
 
 /// What lay on the simulated stage, where the built-in simulator was used and its specimen can still be had.

@@ -21,6 +21,7 @@ mod run;
 mod slice;
 
 pub use check::{Check, Verdict};
+pub use derive::model;
 pub use directory::RunDirectory;
 pub use error::{ReportError, is_full};
 pub use measurement::{Measurement, measurements, observations};

@@ -49,3 +49,19 @@ pub enum Model {
     /// The same of all planes and the arc, interpolated between the planes.
     Planes,
 }
+
+impl Model {
+    /// As job files name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Separable => "separable",
+            Self::Reciprocal => "reciprocal",
+            Self::Planes => "planes",
+        }
+    }
+
+    /// Whether it is made of the first plane and the arc alone, whatever else was measured.
+    pub fn of_one_plane(self) -> bool {
+        matches!(self, Self::Separable | Self::Reciprocal)
+    }
+}
