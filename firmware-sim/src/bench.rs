@@ -1,7 +1,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use arms::{Arm, Pose};
+use arms::{Arm, ArmAngle, Pose};
 use brdf::Brdf;
 use glam::DVec3;
 use rand::SeedableRng;
@@ -35,6 +35,8 @@ pub struct Bench {
     now: Duration,
     clock: Clock,
     axes: [Axis; 2],
+    /// Where each arm really is when its encoder says 0, rad.
+    zeros_rad: [f64; 2],
     servos: [Servo; 2],
     photometer: Photometer,
     photodiodes: Photodiodes,
@@ -72,6 +74,7 @@ impl Bench {
             now: Duration::ZERO,
             clock: settings.clock,
             axes: Arm::BOTH.map(|arm| rig.arm(arm).axis),
+            zeros_rad: [amounts.light_zero_deg, amounts.sensor_zero_deg].map(f64::to_radians),
             servos: [
                 Servo::new(fitting(rig, &settings, Arm::Light, baud_code)?),
                 Servo::new(fitting(rig, &settings, Arm::Sensor, baud_code)?),
@@ -191,7 +194,10 @@ impl Bench {
     }
 
     fn pose_at(&self, t_s: f64) -> Pose {
-        let angle = |i: usize| self.axes[i].angle(self.servos[i].arm(t_s));
+        let angle = |i: usize| {
+            let shown = self.axes[i].angle(self.servos[i].arm(t_s));
+            ArmAngle::from_rad(shown.rad() + self.zeros_rad[i])
+        };
         Pose {
             light: angle(0),
             sensor: angle(1),
@@ -253,7 +259,8 @@ fn photometer(rig: &RigFile, settings: &Settings, baud_code: u8) -> Photometer {
         ambient_c: settings.ambient_c,
         self_heating_c: amounts.self_heating_c,
     };
-    let lamp = Lamp::new(warm_up_s, amounts.lamp_drift, amounts.lamp_flicker, &mut once);
+    let lamp = Lamp::new(warm_up_s, amounts.lamp_drift, amounts.lamp_flicker, &mut once)
+        .with_trend(amounts.lamp_trend_per_h);
     Photometer::new(fitting, lamp)
 }
 

@@ -34,10 +34,25 @@ pub struct Imperfections {
     pub sensor_backlash_deg: f64,
     /// By how much a shaft is late behind its profile.
     pub following_lag: Duration,
+    /// By how much the photometer is more sensitive than the rig file says, relative.
+    pub responsivity_error: f64,
+    /// By how much the gain steps above ×1 amplify more than they should, relative.
+    pub gain_error: f64,
+    /// Share of the counts that is lost at full scale; the loss grows with their square.
+    pub nonlinearity: f64,
+    /// Share of each colour channel's light that comes from the two others, evenly.
+    pub crosstalk: f64,
+    /// By how much the lamp's output grows in an hour, relative to nominal; the monitor sees it too.
+    pub lamp_trend_per_h: f64,
+    /// Where the light arm really is when its encoder says 0, degrees.
+    pub light_zero_deg: f64,
+    /// Where the sensor arm really is when its encoder says 0, degrees.
+    pub sensor_zero_deg: f64,
 }
 
 impl Imperfections {
-    /// A modest but decent instrument: 0.1 % on a white specimen, a few percent on a black one away from its lobe.
+    /// A modest but decent instrument: 0.1 % on a white specimen, a few percent on a black one away from its lobe. What
+    /// only a calibration can remove is 0: the rig file is taken to be right.
     pub const DEFAULT: Self = Self {
         shot_noise_electrons: 64.0,
         read_noise_counts: 3.0,
@@ -54,6 +69,13 @@ impl Imperfections {
         light_backlash_deg: 0.02,
         sensor_backlash_deg: 0.02,
         following_lag: Duration::from_millis(8),
+        responsivity_error: 0.0,
+        gain_error: 0.0,
+        nonlinearity: 0.0,
+        crosstalk: 0.0,
+        lamp_trend_per_h: 0.0,
+        light_zero_deg: 0.0,
+        sensor_zero_deg: 0.0,
     };
 
     /// An ideal instrument.
@@ -73,6 +95,13 @@ impl Imperfections {
         light_backlash_deg: 0.0,
         sensor_backlash_deg: 0.0,
         following_lag: Duration::ZERO,
+        responsivity_error: 0.0,
+        gain_error: 0.0,
+        nonlinearity: 0.0,
+        crosstalk: 0.0,
+        lamp_trend_per_h: 0.0,
+        light_zero_deg: 0.0,
+        sensor_zero_deg: 0.0,
     };
 }
 

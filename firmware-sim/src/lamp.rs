@@ -19,10 +19,13 @@ struct Ripple {
 
 /// The lamp: output relative to nominal, 1, as a closed form of time.
 ///
-/// L(t) = (1 − e^(−(t − t_on)/τ)) · (1 + Σ A sin(ωt + φ)); τ is the warm-up, the sum the slow drift and the flicker.
+/// L(t) = (1 − e^(−(t − t_on)/τ)) · (1 + bt + Σ A sin(ωt + φ)); τ is the warm-up, b a trend, the sum the slow drift and
+/// the flicker.
 #[derive(Clone, Debug)]
 pub(crate) struct Lamp {
     warm_up_s: f64,
+    /// Relative growth per second.
+    trend_per_s: f64,
     ripples: Vec<Ripple>,
     /// Spans of light: on, off; seconds since power-on.
     spans: VecDeque<(f64, f64)>,
@@ -44,9 +47,16 @@ impl Lamp {
             .collect();
         Self {
             warm_up_s,
+            trend_per_s: 0.0,
             ripples,
             spans: VecDeque::new(),
         }
+    }
+
+    /// The same with a trend, relative to nominal output.
+    pub(crate) fn with_trend(mut self, per_h: f64) -> Self {
+        self.trend_per_s = per_h / 3600.0;
+        self
     }
 
     pub(crate) fn on(&self) -> bool {
@@ -67,7 +77,7 @@ impl Lamp {
             return 0.0;
         };
         let ripple = |ripple: &Ripple| ripple.amplitude * (ripple.omega * t_s + ripple.phase).sin();
-        self.warmth(t_s - on) * (1.0 + self.ripples.iter().map(ripple).sum::<f64>())
+        self.warmth(t_s - on) * (1.0 + self.trend_per_s * t_s + self.ripples.iter().map(ripple).sum::<f64>())
     }
 
     fn warmth(&self, since_s: f64) -> f64 {
@@ -103,7 +113,9 @@ impl Lamp {
             let warming = tau * cold * (sin + omega * tau * cos) / (1.0 + (omega * tau).powi(2));
             amplitude * (steady + warming)
         };
-        t + tau * cold + self.ripples.iter().map(ripple).sum::<f64>()
+        // ∫ t, and ∫ −t e^(−(t − on)/τ) = τ e^(…) (t + τ).
+        let trend = self.trend_per_s * (t * t / 2.0 + tau * cold * (t + tau));
+        t + tau * cold + trend + self.ripples.iter().map(ripple).sum::<f64>()
     }
 
     /// Moments within a stretch of time at which the lamp was switched.
@@ -130,6 +142,17 @@ mod tests {
 
     fn lamp() -> Lamp {
         Lamp::new(0.02, 0.005, 0.001, &mut ChaCha8Rng::seed_from_u64(1))
+    }
+
+    #[test]
+    fn a_trend_is_in_level_and_integral() {
+        let mut lamp = lamp().with_trend(36.0);
+        lamp.switch(0.1, true);
+        assert!((lamp.level(10.0) - 1.1).abs() < 0.01);
+        for (from, to) in [(0.1, 0.11), (0.3, 2.0)] {
+            let (exact, numeric) = (lamp.integral(from, to), numeric(&lamp, from, to));
+            assert!((exact - numeric).abs() < 1e-6, "{exact} against {numeric}");
+        }
     }
 
     /// Midpoint rule, fine enough for 1e-9.

@@ -43,7 +43,8 @@ impl Photodiodes {
     /// Counts of the `serial`-th integration: its noise depends on nothing but that number and the seed.
     ///
     /// Mean counts of a channel are gain · (responsivity · (signal + stray · lamp) + dark · time); electrons are
-    /// Poisson, read noise is normal. The monitor has neither gain, dark signal nor offset.
+    /// Poisson, read noise is normal. The monitor has neither gain, dark signal nor offset. Responsivity, gain, linearity
+    /// and colours are off by the stated errors.
     pub(crate) fn expose(&self, light: Light, serial: u64) -> Exposed {
         let Imperfections {
             shot_noise_electrons: electrons,
@@ -51,6 +52,10 @@ impl Photodiodes {
             dark_doubling_c,
             dark_offset_counts,
             stray_per_sr,
+            responsivity_error,
+            gain_error,
+            nonlinearity,
+            crosstalk,
             ..
         } = self.imperfections;
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
@@ -60,17 +65,22 @@ impl Photodiodes {
             doubling => (light.temperature_c - DARK_REFERENCE_C) / doubling,
         };
         let dark = dark_counts_per_s * warmer.exp2() * light.duration_s;
-        let channel = |(responsivity, signal): (f64, f64)| {
-            let lit = responsivity * 1e6 * (signal + stray_per_sr * light.lamp_s);
-            let noisy = light.gain * shot(lit + dark, electrons, &mut random);
-            self.convert(noisy + dark_offset_counts, &mut random)
+        let gain = match light.gain {
+            1.0 => 1.0,
+            gain => gain * (1.0 + gain_error),
         };
+        let full_scale = f64::from(self.full_scale);
+        let channel = |(responsivity, signal): (f64, f64)| {
+            let lit =
+                responsivity * (1.0 + responsivity_error) * 1e6 * (signal + stray_per_sr * light.lamp_s);
+            let noisy = gain * shot(lit + dark, electrons, &mut random);
+            let shown = noisy * (1.0 - nonlinearity * noisy.min(full_scale) / full_scale);
+            self.convert(shown + dark_offset_counts, &mut random)
+        };
+        let others = |signal: DVec3| (DVec3::splat(signal.element_sum()) - signal) / 2.0;
+        let seen = light.signal * (1.0 - crosstalk) + others(light.signal) * crosstalk;
         let mut rgb = [0; 3];
-        let pairs = self
-            .calibration
-            .responsivity
-            .into_iter()
-            .zip(light.signal.to_array());
+        let pairs = self.calibration.responsivity.into_iter().zip(seen.to_array());
         for (counts, counted) in rgb.iter_mut().zip(pairs.map(channel)) {
             *counts = counted;
         }

@@ -73,6 +73,13 @@ struct Raw {
     light_backlash_deg: Option<f64>,
     sensor_backlash_deg: Option<f64>,
     following_lag_ms: Option<f64>,
+    responsivity_error: Option<f64>,
+    gain_error: Option<f64>,
+    nonlinearity: Option<f64>,
+    crosstalk: Option<f64>,
+    lamp_trend_per_h: Option<f64>,
+    light_zero_deg: Option<f64>,
+    sensor_zero_deg: Option<f64>,
 }
 
 impl Settings {
@@ -125,6 +132,7 @@ fn imperfections(raw: &Raw) -> Result<Imperfections, SimError> {
         Some(Preset::None) => Imperfections::NONE,
     };
     let amount = |key, value, base, max| within(key, value, base, 0.0..=max);
+    let signed = |key, value, base, max: f64| within(key, value, base, -max..=max);
     Ok(Imperfections {
         shot_noise_electrons: amount(
             "shot_noise_electrons",
@@ -196,6 +204,23 @@ fn imperfections(raw: &Raw) -> Result<Imperfections, SimError> {
             base.following_lag.as_secs_f64() * 1e3,
             500.0,
         )?,
+        responsivity_error: signed(
+            "responsivity_error",
+            raw.responsivity_error,
+            base.responsivity_error,
+            0.5,
+        )?,
+        gain_error: signed("gain_error", raw.gain_error, base.gain_error, 0.5)?,
+        nonlinearity: amount("nonlinearity", raw.nonlinearity, base.nonlinearity, 0.1)?,
+        crosstalk: amount("crosstalk", raw.crosstalk, base.crosstalk, 0.5)?,
+        lamp_trend_per_h: signed(
+            "lamp_trend_per_h",
+            raw.lamp_trend_per_h,
+            base.lamp_trend_per_h,
+            0.5,
+        )?,
+        light_zero_deg: signed("light_zero_deg", raw.light_zero_deg, base.light_zero_deg, 5.0)?,
+        sensor_zero_deg: signed("sensor_zero_deg", raw.sensor_zero_deg, base.sensor_zero_deg, 5.0)?,
     })
 }
 

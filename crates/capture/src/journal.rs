@@ -1,4 +1,4 @@
-use rig::Identity;
+use rig::{Certificate, Identity};
 use serde::{Deserialize, Serialize};
 use sweep::{Plan, Step};
 
@@ -20,6 +20,10 @@ pub struct Header {
     pub plan: Plan,
     /// Wall clock at the start, RFC 3339, UTC.
     pub started: String,
+    /// The stored calibration that holds for the run, where one is used: kept whole, so that the run can be worked out
+    /// again without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certificate: Option<Certificate>,
 }
 
 /// How an execution of a plan ended.

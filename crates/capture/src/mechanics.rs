@@ -1,5 +1,5 @@
 use arms::{ArmAngle, Pose};
-use rig::{Approach, Port, RigFile};
+use rig::{Approach, Lamp, Port, RigFile};
 use sweep::Mechanics;
 
 /// What a planner needs to know of the rig in a rig file, with the arms standing at `start`.
@@ -25,6 +25,14 @@ pub fn mechanics(rig: &RigFile, start: Option<Pose>) -> Mechanics {
         ],
         transaction_s: transaction_s(rig),
         warm_up_s: rig.photometer.lamp_warm_up.as_secs_f64(),
+        dark_every_s: rig.visits.dark_every.as_secs_f64(),
+        reference: match rig.visits.lamp {
+            Lamp::Monitor => None,
+            Lamp::Visits => Some((
+                rig.nearest(rig.visits.reference),
+                rig.visits.reference_every.as_secs_f64(),
+            )),
+        },
         start,
     }
 }

@@ -63,6 +63,7 @@ pub async fn run(
         rig: order.rig_text.clone(),
         plan,
         started: humantime::format_rfc3339_seconds(now).to_string(),
+        certificate: None,
     };
     let mut journal = FileJournal::create(directory.journal(), header)?;
     finish(directory, &mut station, &mut journal, control, on_event).await

@@ -1,7 +1,8 @@
+use arms::Pose;
 use capture::{Reading, Record};
 use glam::DVec3;
 use pdv::{Observation, Pdv};
-use rig::{Dark, RigFile, Unusable};
+use rig::{Budget, Certificate, Reduction, RigFile, Taken, Unusable};
 use sweep::Sweep;
 
 use crate::run::TICK_S;
@@ -11,12 +12,18 @@ use crate::run::TICK_S;
 pub struct Measurement {
     /// The reading, raw.
     pub reading: Reading,
-    /// Zenith angle of the sensor as measured, rad.
+    /// Where the arms really were, by what was measured and the certificate's alignment.
+    pub pose: Pose,
+    /// Zenith angle of the sensor there, rad.
     pub theta_r: f64,
-    /// Signed deviation from the mirror direction as measured; positive towards the normal, negative outwards.
+    /// Signed deviation from the mirror direction there; positive towards the normal, negative outwards.
     pub deviation: f64,
     /// Reflectance, linear RGB in sr⁻¹; `None` with the lamp off; an error where the counts say nothing.
     pub reflectance: Option<Result<DVec3, Unusable>>,
+    /// The same in the sensor's own colours, before the colour matrix.
+    pub raw: Option<DVec3>,
+    /// How sure the reflectance is, as far as this reading can tell.
+    pub budget: Option<Budget>,
     /// Rig time since the start of the run, s.
     pub time_s: f64,
 }
@@ -48,22 +55,41 @@ pub fn measurements(records: &[Record], rig: &RigFile) -> Vec<Measurement> {
             _ => None,
         })
     };
-    let dark = Dark::fit(readings().filter(|r| !r.lamp).map(|r| &r.counts));
-    let reflectance = |reading: &Reading| {
-        let rgb = rig
-            .calibration
-            .reflectance(&dark, reading.measured, &reading.counts);
-        rgb.map(DVec3::from_array)
+    let time_s = |reading: &Reading| reading.device_ticks.saturating_sub(begun) as f64 * TICK_S;
+    let taken = |reading: &Reading| Taken {
+        pose: reading.measured,
+        time_s: time_s(reading),
+        lamp: reading.lamp,
+        counts: reading.counts,
     };
-    readings()
-        .map(|reading| Measurement {
-            theta_r: reading.measured.sensor.rad().abs(),
-            deviation: reading.measured.deviation() * 1_f64.copysign(reading.measured.sensor.rad()),
-            reflectance: reading.lamp.then(|| reflectance(reading)),
-            time_s: reading.device_ticks.saturating_sub(begun) as f64 * TICK_S,
+    let all: Vec<Taken> = readings().map(taken).collect();
+    let visits = readings().filter(|reading| reading.sweep == Sweep::Reference && reading.accepted);
+    let visits: Vec<Taken> = visits.map(taken).collect();
+    let reduction = Reduction::new(rig, certificate(records), &all, &visits);
+    let measure = |(reading, taken): (&Reading, &Taken)| {
+        let reflectance = reading.lamp.then(|| reduction.reflectance(taken));
+        let good = reflectance.and_then(Result::ok);
+        let pose = reduction.aligned(reading.measured);
+        Measurement {
+            pose,
+            theta_r: pose.sensor.rad().abs(),
+            deviation: pose.deviation() * 1_f64.copysign(pose.sensor.rad()),
+            reflectance: reflectance.map(|result| result.map(|good| DVec3::from_array(good.rgb))),
+            raw: good.map(|good| DVec3::from_array(good.raw)),
+            budget: good.map(|good| good.u),
+            time_s: time_s(reading),
             reading: reading.clone(),
-        })
-        .collect()
+        }
+    };
+    readings().zip(&all).map(measure).collect()
+}
+
+/// The stored calibration that holds for a run, from its journal.
+pub(crate) fn certificate(records: &[Record]) -> Option<&Certificate> {
+    match records.first() {
+        Some(Record::Header(header)) => header.certificate.as_ref(),
+        _ => None,
+    }
 }
 
 /// What the accepted readings of one sweep observed.

@@ -243,6 +243,7 @@ mod tests {
                 open: false,
             },
             started: "2026-01-01T00:00:00Z".into(),
+            certificate: None,
         }
     }
 

@@ -55,6 +55,14 @@ pub enum RigError {
         /// What may stand there.
         allowed: String,
     },
+    /// The readings of a standard do not make a calibration.
+    #[error("{what}: {why}")]
+    Calibration {
+        /// Which standard.
+        what: &'static str,
+        /// What is missing.
+        why: String,
+    },
     /// The system does not list its serial ports.
     #[error("cannot list the serial ports")]
     Ports {
@@ -199,6 +207,7 @@ impl Fault for RigError {
             Self::Read { .. }
             | Self::Form { .. }
             | Self::Value { .. }
+            | Self::Calibration { .. }
             | Self::Ports { .. }
             | Self::PortMissing { .. }
             | Self::PortLocked { .. }

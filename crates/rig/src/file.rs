@@ -3,7 +3,7 @@ use std::time::Duration;
 
 use arms::{Arm, ArmAngle, Envelope, Pose, Profile};
 
-use crate::{Axis, Calibration, RigError};
+use crate::{Axis, Calibration, Lamp, RigError};
 
 mod check;
 mod raw;
@@ -29,8 +29,60 @@ pub struct RigFile {
     pub photometer: PhotometerSettings,
     /// From counts to reflectance.
     pub calibration: Calibration,
+    /// What is repeated during a run.
+    pub visits: Visits,
+    /// Stored calibrations.
+    pub certificates: Certificates,
+    /// What is known of the uncertainties.
+    pub uncertainty: Uncertainties,
     /// The `[sim]` table, parsed by the simulator alone.
     pub sim: toml::Table,
+    /// SHA-256, hexadecimal, of everything in the file that a calibration depends on: arms, photometer, filling and
+    /// constants, with the defaults filled in.
+    pub fingerprint: String,
+}
+
+/// `[calibration]`: what is repeated during a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Visits {
+    /// Time between two sets of dark readings; zero: at the start alone.
+    pub dark_every: Duration,
+    /// How the lamp's output is followed.
+    pub lamp: Lamp,
+    /// Time between two visits to the reference pose, where those follow the lamp.
+    pub reference_every: Duration,
+    /// The reference pose.
+    pub reference: Pose,
+}
+
+/// `[calibration]`: stored calibrations.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Certificates {
+    /// Whether a run needs a valid one; without, the constants of the rig file hold.
+    pub required: bool,
+    /// Where they are.
+    pub directory: PathBuf,
+    /// How old a part of one may be.
+    pub max_age: Duration,
+}
+
+/// `[uncertainty]`: standard uncertainties of what no reading tells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Uncertainties {
+    /// Electrons per count at gain ×1; 0: no shot noise.
+    pub electrons_per_count: f64,
+    /// Of the converter, counts at any gain.
+    pub read_noise_counts: f64,
+    /// Of the rig file's responsivity, relative.
+    pub responsivity: f64,
+    /// Of the stray light, as f·cos in sr⁻¹, where no black trap was measured.
+    pub stray_per_sr: f64,
+    /// Of an arm's angle at each reading, rad.
+    pub angle_rad: f64,
+    /// Of an arm's zero, rad, where no mirror was measured.
+    pub zero_rad: f64,
+    /// Half angles of source and detector as the specimen sees them, rad.
+    pub apertures_rad: [f64; 2],
 }
 
 /// `[bus]`

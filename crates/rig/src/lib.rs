@@ -16,13 +16,17 @@ mod rig;
 
 pub use actuator::{Actuator, Identity, Location};
 pub use axis::{ACCELERATION_UNIT_RAD_S2, Axis, COUNTS_PER_TURN, VELOCITY_UNIT_RAD_S};
-pub use calibration::{Calibration, Dark, Filling, MIN_COSINE, Unusable};
+pub use calibration::{
+    Budget, Calibration, Certificate, Certified, Colour, Conditions, Dark, DarkCounts, Darks, Drift, Filling,
+    Lamp, MIN_COSINE, Reduction, Reflectance, Taken, Trap, Unusable, White, Zero,
+};
 pub use detector::{Counts, Detector, DetectorStatus, Exposure, Gain, Phase};
 pub use drive::{Drive, DriveError};
 pub use dynamixel::{Adapter, Dynamixel, Usb, ports};
 pub use error::{Place, RigError};
 pub use fault::{Device, Fault, FaultKind};
 pub use file::{
-    Approach, ArmSettings, BusSettings, Estop, MotionSettings, PhotometerSettings, Port, RigFile,
+    Approach, ArmSettings, BusSettings, Certificates, Estop, MotionSettings, PhotometerSettings, Port,
+    RigFile, Uncertainties, Visits,
 };
 pub use rig::{Rig, Snapshot};

@@ -19,5 +19,5 @@ pub use job::{Arc, Job, Model, Plane};
 pub use mechanics::Mechanics;
 pub use pdv::Distribution;
 pub use plan::{LeftOut, Plan, Step, Sweep};
-pub use planner::plan;
+pub use planner::{Visit, plan, visits};
 pub use route::way;

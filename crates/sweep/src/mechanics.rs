@@ -24,6 +24,11 @@ pub struct Mechanics {
     pub transaction_s: f64,
     /// Lamp warm-up, s.
     pub warm_up_s: f64,
+    /// Seconds between two sets of dark readings; 0: at the start alone.
+    pub dark_every_s: f64,
+    /// Pose that is visited again and again to follow the lamp, and the seconds between two visits; `None`: the
+    /// lamp's monitor follows it.
+    pub reference: Option<(Pose, f64)>,
     /// Where the arms stand before the run; `None`: not known yet, then the plan's first leg is not timed or checked.
     pub start: Option<Pose>,
 }

@@ -141,6 +141,8 @@ mod tests {
             integration_us: [100, 1000],
             transaction_s: 0.0,
             warm_up_s: 0.0,
+            dark_every_s: 0.0,
+            reference: None,
             start: None,
         }
     }

@@ -11,7 +11,7 @@ pub enum Sweep {
     Plane(usize),
     /// The mirror arc.
     Arc,
-    /// A visit to the white reference.
+    /// A visit to the reference pose, or to a standard in a calibration.
     Reference,
     /// A pose that was measured before.
     Repeat,

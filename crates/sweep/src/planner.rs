@@ -1,4 +1,4 @@
-use arms::Pose;
+use arms::{Arm, Pose};
 
 use crate::order::order;
 use crate::reach::Reach;
@@ -15,7 +15,8 @@ const DARK_REPEATS: usize = 4;
 /// Plans a job on a rig.
 ///
 /// First the dark readings, lamp off, where the arms stand: each gain at the shortest and the longest integration, so
-/// that offset and rate can be fitted. Then the plane sweeps and the arc, in the order and direction with the least
+/// that offset and rate can be fitted. A long job repeats them every now and then, and ends with a last set; where
+/// visits to a reference pose follow the lamp, it begins and ends with one. Then the plane sweeps and the arc, in the order and direction with the least
 /// time of motion from where the arms stand. Angles are whole steps of the servos.
 ///
 /// # Errors
@@ -50,21 +51,84 @@ pub fn plan(job: &Job, mechanics: &Mechanics) -> Result<Plan, SweepError> {
         });
     };
 
-    let mut draft = Draft {
-        mechanics,
-        steps: Vec::new(),
-        standing: start,
-    };
+    let mut draft = Draft::new(mechanics, start);
     draft.dark();
+    draft.visit_reference(&job.name)?;
     for (i, backwards) in order {
         let poses = &poses[i];
         let along = (0..poses.len()).map(|j| poses[if backwards { poses.len() - 1 - j } else { j }]);
-        draft.sweep(&mut sweeps[i], along);
+        draft.sweep(&job.name, &mut sweeps[i], along)?;
     }
+    if draft.dark_sets > 1 {
+        draft.dark();
+    }
+    draft.visit_reference(&job.name)?;
     let left_out = sweeps.into_iter().flat_map(|sweep| sweep.left_out).collect();
     let plan = Plan {
         steps: draft.steps,
         left_out,
+        overhead_s: mechanics.warm_up_s,
+        open: false,
+    };
+    check(&plan, mechanics, start.pose)?;
+    Ok(plan)
+}
+
+/// One reading that a calibration asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Visit {
+    /// What it belongs to.
+    pub sweep: Sweep,
+    /// Where; the nearest pose that the servos can take is visited.
+    pub pose: Pose,
+    /// Gain step and integration time in µs; `None`: ranged from the readings before.
+    pub exposure: Option<(u8, u32)>,
+}
+
+/// Plans readings at given poses in a given order, between two sets of dark readings. `name` is what errors call it.
+///
+/// # Errors
+/// The arms stand outside the envelope; a pose that cannot be reached or is in shadow.
+pub fn visits(name: &str, visits: &[Visit], mechanics: &Mechanics) -> Result<Plan, SweepError> {
+    let nearest = |pose: Pose| {
+        Arm::BOTH.into_iter().fold(pose, |pose, arm| {
+            pose.with(arm, mechanics.nearest(arm, pose.angle(arm)))
+        })
+    };
+    let start = match mechanics.start {
+        Some(pose) => Standing::measured(mechanics, pose)?,
+        None => Standing {
+            pose: visits
+                .first()
+                .map_or(Pose::default(), |visit| nearest(visit.pose)),
+            approached: false,
+        },
+    };
+    let reach = Reach::new(mechanics, Some(start.pose));
+    let mut draft = Draft::new(mechanics, start);
+    draft.dark();
+    for visit in visits {
+        let pose = nearest(visit.pose);
+        let refuse = |why: String| SweepError::Unreachable {
+            file: name.to_owned(),
+            key: format!("light {:.1}°, sensor {:.1}°", pose.light.deg(), pose.sensor.deg()),
+            why,
+        };
+        reach
+            .check(pose)
+            .map_err(|hindrance| refuse(reach.why(&hindrance)))?;
+        let integration_s = match visit.exposure {
+            Some((_, integration_us)) => f64::from(integration_us) * 1e-6,
+            None => mechanics.integration_s(),
+        };
+        if !draft.go(visit.sweep, pose, visit.exposure, integration_s) {
+            return Err(refuse("no safe way leads there".to_owned()));
+        }
+    }
+    draft.dark();
+    let plan = Plan {
+        steps: draft.steps,
+        left_out: Vec::new(),
         overhead_s: mechanics.warm_up_s,
         open: false,
     };
@@ -77,11 +141,73 @@ struct Draft<'a> {
     mechanics: &'a Mechanics,
     steps: Vec<Step>,
     standing: Standing,
+    /// Sets of dark readings so far.
+    dark_sets: usize,
+    /// Seconds since the last of them, and since the last visit to the reference pose.
+    since_dark_s: f64,
+    since_visit_s: f64,
+    /// Whether the lamp must come on again, after dark readings that were not the first.
+    cold: bool,
 }
 
-impl Draft<'_> {
+impl<'a> Draft<'a> {
+    fn new(mechanics: &'a Mechanics, standing: Standing) -> Self {
+        Self {
+            mechanics,
+            steps: Vec::new(),
+            standing,
+            dark_sets: 0,
+            since_dark_s: 0.0,
+            since_visit_s: 0.0,
+            cold: false,
+        }
+    }
+
+    /// What is due before the next reading of a sweep.
+    fn upkeep(&mut self, job: &str) -> Result<(), SweepError> {
+        if self.mechanics.dark_every_s > 0.0 && self.since_dark_s >= self.mechanics.dark_every_s {
+            self.dark();
+        }
+        match self.mechanics.reference {
+            Some((_, every_s)) if self.since_visit_s >= every_s => self.visit_reference(job),
+            _ => Ok(()),
+        }
+    }
+
+    /// A reading at the reference pose, where there is one.
+    fn visit_reference(&mut self, job: &str) -> Result<(), SweepError> {
+        let Some((pose, _)) = self.mechanics.reference else {
+            return Ok(());
+        };
+        if !self.go(Sweep::Reference, pose, None, self.mechanics.integration_s()) {
+            return Err(SweepError::Unreachable {
+                file: job.to_owned(),
+                key: "the reference pose of the rig file".to_owned(),
+                why: "no safe way leads there".to_owned(),
+            });
+        }
+        self.since_visit_s = 0.0;
+        Ok(())
+    }
+
+    /// One lit reading at a pose; false where no safe way leads there.
+    fn go(&mut self, sweep: Sweep, pose: Pose, exposure: Option<(u8, u32)>, integration_s: f64) -> bool {
+        let Some(route) = route(self.mechanics, self.standing, pose) else {
+            return false;
+        };
+        let seconds = route.seconds + self.mechanics.settle_s + integration_s + self.mechanics.transaction_s;
+        self.push(sweep, route.path, exposure, seconds);
+        self.standing = Standing {
+            pose,
+            approached: true,
+        };
+        true
+    }
+
     /// All dark readings, where the arms stand.
     fn dark(&mut self) {
+        self.cold = self.dark_sets > 0;
+        self.dark_sets += 1;
         for gain in 0..GAINS {
             for integration_us in self.mechanics.integration_us {
                 for _ in 0..DARK_REPEATS {
@@ -97,25 +223,22 @@ impl Draft<'_> {
                 }
             }
         }
+        self.since_dark_s = 0.0;
     }
 
     /// A sweep along poses; what no safe way leads to is left out.
-    fn sweep(&mut self, targets: &mut Targets, poses: impl Iterator<Item = Pose>) {
+    fn sweep(
+        &mut self,
+        job: &str,
+        targets: &mut Targets,
+        poses: impl Iterator<Item = Pose>,
+    ) -> Result<(), SweepError> {
         let mut unreached = 0;
         for pose in poses {
-            let Some(route) = route(self.mechanics, self.standing, pose) else {
+            self.upkeep(job)?;
+            if !self.go(targets.sweep, pose, None, self.mechanics.integration_s()) {
                 unreached += 1;
-                continue;
-            };
-            let seconds = route.seconds
-                + self.mechanics.settle_s
-                + self.mechanics.integration_s()
-                + self.mechanics.transaction_s;
-            self.push(targets.sweep, route.path, None, seconds);
-            self.standing = Standing {
-                pose,
-                approached: true,
-            };
+            }
         }
         if unreached > 0 {
             targets.left_out.push(LeftOut {
@@ -124,10 +247,17 @@ impl Draft<'_> {
                 readings: unreached,
             });
         }
+        Ok(())
     }
 
     fn push(&mut self, sweep: Sweep, path: Vec<Pose>, exposure: Option<(u8, u32)>, seconds: f64) {
         let lamp = sweep != Sweep::Dark;
+        let seconds = match lamp && std::mem::take(&mut self.cold) {
+            true => seconds + self.mechanics.warm_up_s,
+            false => seconds,
+        };
+        self.since_dark_s += seconds;
+        self.since_visit_s += seconds;
         self.steps.push(Step {
             index: self.steps.len(),
             sweep,

@@ -31,6 +31,7 @@ impl MemoryJournal {
             rig: String::new(),
             plan,
             started: String::new(),
+            certificate: None,
         };
         Self {
             records: vec![Record::Header(header)],

@@ -21,6 +21,7 @@ fn header() -> Header {
             open: false,
         },
         started: "2026-11-22T04:00:00Z".to_owned(),
+        certificate: None,
     }
 }
 

@@ -1,3 +1,5 @@
+use super::Taken;
+use super::line::Line;
 use crate::{Counts, Exposure, Gain};
 
 /// What the photometer counts in the dark: for each gain and channel an offset and a rate, fitted to dark readings.
@@ -9,50 +11,22 @@ pub struct Dark {
     monitor: Line,
 }
 
-/// Counts over integration time: offset + rate · t.
+/// What an exposure would have in the dark.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Line {
-    /// Counts.
-    offset: f64,
-    /// Counts per µs.
-    rate: f64,
-}
-
-impl Line {
-    const ZERO: Self = Self {
-        offset: 0.0,
-        rate: 0.0,
-    };
-
-    /// Least squares through (t in µs, counts); of a single integration time, all is offset.
-    fn fit(points: &[(f64, f64)]) -> Option<Self> {
-        let n = points.len() as f64;
-        if points.is_empty() {
-            return None;
-        }
-        let mean_t = points.iter().map(|p| p.0).sum::<f64>() / n;
-        let mean_c = points.iter().map(|p| p.1).sum::<f64>() / n;
-        let spread: f64 = points.iter().map(|p| (p.0 - mean_t).powi(2)).sum();
-        let common: f64 = points.iter().map(|p| (p.0 - mean_t) * (p.1 - mean_c)).sum();
-        let rate = if spread > 0.0 { common / spread } else { 0.0 };
-        Some(Self {
-            offset: mean_c - rate * mean_t,
-            rate,
-        })
-    }
-
-    fn at(self, time_us: f64) -> f64 {
-        self.offset + self.rate * time_us
-    }
+pub struct DarkCounts {
+    /// Counts of red, green and blue.
+    pub rgb: [f64; 3],
+    /// Standard uncertainty of each, counts.
+    pub u_rgb: [f64; 3],
+    /// Counts of red, green and blue without any time: what holds no electrons, and so no shot noise.
+    pub offset: [f64; 3],
+    /// Counts of the monitor.
+    pub monitor: f64,
+    /// Its standard uncertainty, counts.
+    pub u_monitor: f64,
 }
 
 impl Dark {
-    /// A photometer that counts nothing in the dark.
-    pub const NONE: Self = Self {
-        rgb: [Some([Line::ZERO; 3]); 3],
-        monitor: Line::ZERO,
-    };
-
     /// Fits dark readings: least squares of counts over integration time, for each gain and channel by itself. Two
     /// integration times per gain make offset and rate distinct; of one alone, all is taken for offset. The fitted
     /// values are not forced to be positive, so that noise averages out.
@@ -80,17 +54,82 @@ impl Dark {
         }
     }
 
-    /// Counts that an exposure would have in the dark, of red, green, blue and of the monitor; `None` where no dark
-    /// reading was taken at its gain.
-    pub fn counts(&self, exposure: Exposure) -> Option<([f64; 3], f64)> {
+    /// What an exposure would have in the dark; `None` where no dark reading was taken at its gain.
+    pub fn counts(&self, exposure: Exposure) -> Option<DarkCounts> {
         let time_us = f64::from(exposure.integration_us);
         let lines = self.rgb[exposure.gain as usize]?;
-        Some((lines.map(|line| line.at(time_us)), self.monitor.at(time_us)))
+        Some(DarkCounts {
+            rgb: lines.map(|line| line.at(time_us)),
+            u_rgb: lines.map(|line| line.variance_at(time_us).sqrt()),
+            offset: lines.map(|line| line.offset),
+            monitor: self.monitor.at(time_us),
+            u_monitor: self.monitor.variance_at(time_us).sqrt(),
+        })
+    }
+}
+
+/// Dark readings repeated during a run: between two sets the dark level is interpolated in time, so that a drift with
+/// the photometer's temperature is followed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Darks {
+    /// Mean time of a set, s, and what it says; ascending.
+    sets: Vec<(f64, Dark)>,
+}
+
+impl Darks {
+    /// Fits each unbroken series of readings without lamp, out of all readings of a run in the order of their time.
+    pub fn fit(readings: &[Taken]) -> Self {
+        let sets = readings
+            .chunk_by(|a, b| a.lamp == b.lamp)
+            .filter(|set| !set[0].lamp)
+            .map(|set| {
+                let mean_s = set.iter().map(|taken| taken.time_s).sum::<f64>() / set.len() as f64;
+                (mean_s, Dark::fit(set.iter().map(|taken| &taken.counts)))
+            });
+        Self { sets: sets.collect() }
+    }
+
+    /// What an exposure would have in the dark at a time, s; before the first set and after the last one as there.
+    /// `None` where no dark reading was taken at its gain.
+    ///
+    /// The uncertainty holds that of the fits, and for the way between two sets a quarter of the difference as the
+    /// half width of a rectangle: nobody knows how straight the way was.
+    pub fn counts(&self, time_s: f64, exposure: Exposure) -> Option<DarkCounts> {
+        let usable: Vec<(f64, DarkCounts)> = self
+            .sets
+            .iter()
+            .filter_map(|(at, dark)| Some((*at, dark.counts(exposure)?)))
+            .collect();
+        let after = usable.partition_point(|(at, _)| *at <= time_s);
+        let (Some(before), Some(next)) = (after.checked_sub(1).map(|i| usable[i]), usable.get(after)) else {
+            return usable.get(after).or(usable.last()).map(|(_, counts)| *counts);
+        };
+        let share = (time_s - before.0) / (next.0 - before.0);
+        let between = |a: f64, b: f64| a + share * (b - a);
+        let u = |ua: f64, ub: f64, step: f64| {
+            let fits = ((1.0 - share) * ua).powi(2) + (share * ub).powi(2);
+            (fits + (step / 4.0).powi(2) / 3.0).sqrt()
+        };
+        let (a, b) = (before.1, next.1);
+        Some(DarkCounts {
+            rgb: std::array::from_fn(|c| between(a.rgb[c], b.rgb[c])),
+            u_rgb: std::array::from_fn(|c| u(a.u_rgb[c], b.u_rgb[c], b.rgb[c] - a.rgb[c])),
+            offset: std::array::from_fn(|c| between(a.offset[c], b.offset[c])),
+            monitor: between(a.monitor, b.monitor),
+            u_monitor: u(a.u_monitor, b.u_monitor, b.monitor - a.monitor),
+        })
+    }
+
+    /// Times of the sets, s.
+    pub fn times_s(&self) -> impl Iterator<Item = f64> {
+        self.sets.iter().map(|(at, _)| *at)
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use arms::Pose;
+
     use super::*;
 
     fn reading(gain: Gain, integration_us: u32, rgb: [u32; 3], monitor: u32) -> Counts {
@@ -105,6 +144,15 @@ mod tests {
         }
     }
 
+    fn taken(time_s: f64, lamp: bool, counts: Counts) -> Taken {
+        Taken {
+            pose: Pose::default(),
+            time_s,
+            lamp,
+            counts,
+        }
+    }
+
     #[test]
     fn offset_and_rate_come_apart_with_two_times() {
         let dark = Dark::fit([
@@ -115,11 +163,11 @@ mod tests {
             integration_us: 50_000,
             gain: Gain::X16,
         };
-        let (rgb, monitor) = dark.counts(exposure).unwrap();
-        for (found, expected) in rgb.into_iter().zip([600.0, 700.0, 60.0]) {
+        let at = dark.counts(exposure).unwrap();
+        for (found, expected) in at.rgb.into_iter().zip([600.0, 700.0, 60.0]) {
             assert!((found - expected).abs() < 1e-9, "{found} instead of {expected}");
         }
-        assert!((monitor - 5.0).abs() < 1e-9);
+        assert!((at.monitor - 5.0).abs() < 1e-9);
     }
 
     #[test]
@@ -129,13 +177,31 @@ mod tests {
             &reading(Gain::X256, 1_000, [900; 3], 8),
         ]);
         let at = |gain| {
-            dark.counts(Exposure {
+            let counts = dark.counts(Exposure {
                 integration_us: 1_000,
                 gain,
-            })
+            });
+            counts.map(|counts| (counts.rgb, counts.monitor))
         };
         assert_eq!(at(Gain::X1), Some(([10.0; 3], 6.0)));
         assert_eq!(at(Gain::X256), Some(([900.0; 3], 6.0)));
         assert_eq!(at(Gain::X16), None);
+    }
+
+    #[test]
+    fn between_two_sets_the_dark_drifts_evenly_and_beyond_them_stays() {
+        let set = |time_s: f64, counts: u32| taken(time_s, false, reading(Gain::X1, 1_000, [counts; 3], 0));
+        let lit = taken(5.0, true, reading(Gain::X1, 1_000, [900; 3], 0));
+        let run = [set(0.0, 100), set(2.0, 100), lit, set(10.0, 140), set(12.0, 140)];
+        let darks = Darks::fit(&run);
+        assert_eq!(darks.times_s().collect::<Vec<_>>(), [1.0, 11.0]);
+        let exposure = run[0].counts.exposure;
+        let at = |time_s| darks.counts(time_s, exposure).unwrap().rgb[1];
+        assert_eq!(
+            [at(-3.0), at(1.0), at(6.0), at(11.0), at(99.0)],
+            [100.0, 100.0, 120.0, 140.0, 140.0]
+        );
+        let unsure = darks.counts(6.0, exposure).unwrap().u_rgb[0];
+        assert!(unsure > 10.0 / 3f64.sqrt() && unsure < 6.5, "{unsure}");
     }
 }

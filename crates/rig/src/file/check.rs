@@ -4,7 +4,7 @@ use std::time::Duration;
 use arms::{Arm, ArmAngle, Envelope, Limits, Pose, Profile};
 use toml::Spanned;
 
-use super::raw::{RawArm, RawBus, RawCalibration, RawMotion, RawPhotometer};
+use super::raw::{RawArm, RawBus, RawMotion, RawPhotometer};
 use super::source::Source;
 use super::{Approach, ArmSettings, BusSettings, Estop, MotionSettings, PhotometerSettings, Port, RigFile};
 use crate::axis::{
@@ -12,7 +12,9 @@ use crate::axis::{
     VELOCITY_UNIT_RAD_S,
 };
 use crate::dynamixel::{BAUD_RATES, MODELS};
-use crate::{Axis, Calibration, Filling, RigError};
+use crate::{Axis, RigError};
+
+mod calibration;
 
 /// The text checked: each key for itself, then what keys say together.
 pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
@@ -43,13 +45,18 @@ pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
         bus: bus(source, &raw.bus)?,
         arms: [light, sensor],
         motion: motion(source, &raw.motion, &envelope)?,
-        envelope,
         photometer,
-        calibration: calibration(source, &raw.calibration)?,
+        calibration: calibration::constants(source, &raw.calibration)?,
+        visits: calibration::visits(source, &raw.calibration, &envelope)?,
+        certificates: calibration::certificates(source, &raw.calibration)?,
+        uncertainty: calibration::uncertainty(source, &raw.uncertainty)?,
+        fingerprint: source.fingerprint(RigFile::BUILT_IN)?,
+        envelope,
         sim: raw.sim,
     })
 }
 
+/// A duration in ms.
 fn millis(
     source: &Source<'_>,
     key: &str,
@@ -245,30 +252,5 @@ fn photometer(source: &Source<'_>, raw: &RawPhotometer) -> Result<PhotometerSett
             &raw.lamp_warm_up_ms,
             0.0..=600_000.0,
         )?,
-    })
-}
-
-fn calibration(source: &Source<'_>, raw: &RawCalibration) -> Result<Calibration, RigError> {
-    let fillings = [("over", Filling::Over), ("under", Filling::Under)];
-    let filling = source.one_of("calibration.filling", &raw.filling, &fillings)?;
-    let positive = |value: f64| value > 0.0 && value.is_finite();
-    let responsivity = *raw.responsivity.get_ref();
-    if !responsivity.into_iter().all(positive) {
-        let found = format!("{responsivity:?}");
-        return Err(source.refuse(
-            "calibration.responsivity",
-            &raw.responsivity,
-            found,
-            "three finite values > 0",
-        ));
-    }
-    let monitor = *raw.monitor.get_ref();
-    if !positive(monitor) {
-        return Err(source.refuse("calibration.monitor", &raw.monitor, monitor, "a finite value > 0"));
-    }
-    Ok(Calibration {
-        filling,
-        responsivity,
-        monitor,
     })
 }

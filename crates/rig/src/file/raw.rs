@@ -12,6 +12,7 @@ pub(super) struct RawFile {
     pub(super) motion: RawMotion,
     pub(super) photometer: RawPhotometer,
     pub(super) calibration: RawCalibration,
+    pub(super) uncertainty: RawUncertainty,
     pub(super) sim: toml::Table,
 }
 
@@ -79,4 +80,25 @@ pub(super) struct RawCalibration {
     pub(super) filling: Spanned<String>,
     pub(super) responsivity: Spanned<[f64; 3]>,
     pub(super) monitor: Spanned<f64>,
+    pub(super) lamp: Spanned<String>,
+    pub(super) dark_every_min: Spanned<f64>,
+    pub(super) reference_every_min: Spanned<f64>,
+    pub(super) reference_light_deg: Spanned<f64>,
+    pub(super) reference_sensor_deg: Spanned<f64>,
+    pub(super) certificate: Spanned<String>,
+    pub(super) directory: Spanned<String>,
+    pub(super) max_age_h: Spanned<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawUncertainty {
+    pub(super) electrons_per_count: Spanned<f64>,
+    pub(super) read_noise_counts: Spanned<f64>,
+    pub(super) responsivity_percent: Spanned<f64>,
+    pub(super) stray_per_sr: Spanned<f64>,
+    pub(super) angle_deg: Spanned<f64>,
+    pub(super) zero_deg: Spanned<f64>,
+    pub(super) source_aperture_deg: Spanned<f64>,
+    pub(super) detector_aperture_deg: Spanned<f64>,
 }

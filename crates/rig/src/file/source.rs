@@ -3,6 +3,7 @@ use std::ops::{Range, RangeInclusive};
 use std::path::Path;
 
 use serde::Deserialize;
+use sha2::{Digest, Sha256};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -28,6 +29,33 @@ impl Source<'_> {
         overlay(base.get_mut(), own.get_ref().clone());
         RawFile::deserialize(toml::de::Deserializer::from(base))
             .map_err(|error| self.form(&error, Some(own.get_ref())))
+    }
+
+    /// SHA-256 of what a calibration depends on, with the defaults filled in; see [`crate::RigFile::fingerprint`].
+    pub(super) fn fingerprint(&self, built_in: &str) -> Result<String, RigError> {
+        let table = |text: &str| {
+            text.parse::<toml::Table>()
+                .map_err(|error| self.form(&error, None))
+        };
+        let mut all = table(built_in)?;
+        merge(&mut all, table(self.text)?);
+        all.retain(|key, _| ["light", "sensor", "photometer", "calibration"].contains(&key));
+        for (name, value) in &mut all {
+            let Some(keys) = value.as_table_mut() else {
+                continue;
+            };
+            keys.retain(|key, _| {
+                name != "calibration" || ["filling", "monitor", "responsivity"].contains(&key)
+            });
+            // 60 and 60.0 say the same.
+            for (_, value) in keys.iter_mut() {
+                if let Some(whole) = value.as_integer() {
+                    *value = toml::Value::Float(whole as f64);
+                }
+            }
+        }
+        let hash = Sha256::digest(all.to_string());
+        Ok(hash.iter().map(|byte| format!("{byte:02x}")).collect())
     }
 
     fn form(&self, error: &toml::de::Error, table: Option<&DeTable<'_>>) -> RigError {
@@ -134,4 +162,16 @@ fn key_at(table: &DeTable<'_>, offset: usize) -> Option<String> {
             None => None,
         }
     })
+}
+
+/// Puts every key of `top` over those of `base`, table by table.
+fn merge(base: &mut toml::Table, top: toml::Table) {
+    for (key, value) in top {
+        match (base.get_mut(&key), value) {
+            (Some(toml::Value::Table(below)), toml::Value::Table(above)) => merge(below, above),
+            (_, value) => {
+                base.insert(key, value);
+            }
+        }
+    }
 }

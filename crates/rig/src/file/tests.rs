@@ -184,3 +184,26 @@ fn a_missing_file_is_named() {
     assert_eq!(error.to_string(), "cannot read the rig file /nowhere/rig.toml");
     assert_eq!(crate::Fault::kind(&error), crate::FaultKind::Setup);
 }
+
+#[test]
+fn the_fingerprint_follows_what_a_calibration_depends_on() {
+    let print = |text: &str| parse(text).unwrap().fingerprint;
+    let plain = print("");
+    assert_eq!(plain.len(), 64);
+    for same in [
+        "[sim]\nseed = 3",
+        "[bus]\nport = \"/dev/ttyUSB1\"",
+        "[calibration]\nmax_age_h = 1\ncertificate = \"required\"",
+        "[light]\nvelocity_deg_s = 60 # the default\n",
+    ] {
+        assert_eq!(print(same), plain, "{same}");
+    }
+    for other in [
+        "[light]\nzero_deg = 181",
+        "[photometer]\nfull_scale = 65535\nenough = 100",
+        "[calibration]\nfilling = \"under\"",
+        "[calibration]\nmonitor = 5.1",
+    ] {
+        assert_ne!(print(other), plain, "{other}");
+    }
+}

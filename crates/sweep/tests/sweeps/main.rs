@@ -37,6 +37,8 @@ fn mechanics() -> Mechanics {
         integration_us: [100, 100_000],
         transaction_s: 0.006,
         warm_up_s: 0.2,
+        dark_every_s: 600.0,
+        reference: None,
         start: Some(Pose::from_deg(-45.0, 45.0)),
     }
 }

@@ -1,0 +1,155 @@
+use arms::{ArmAngle, Pose};
+use serde::{Deserialize, Serialize};
+
+use crate::{Gain, RigFile};
+
+/// What was found out about a rig by calibrating it, part by part. It is stored, named in each run that uses it, and
+/// holds for one rig file and a limited time.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Certificate {
+    /// Id, never reused.
+    pub id: String,
+    /// When the last part was made, RFC 3339, UTC.
+    pub made: String,
+    /// [`RigFile::fingerprint`] of the rig file for which it holds.
+    pub rig: String,
+    /// What a white reference said.
+    pub white: Option<White>,
+    /// What a black trap said.
+    pub trap: Option<Trap>,
+    /// What a mirror said.
+    pub zero: Option<Zero>,
+    /// What colour patches said.
+    pub colour: Option<Colour>,
+}
+
+/// How a part of a certificate was made.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Conditions {
+    /// When, RFC 3339, UTC.
+    pub made: String,
+    /// The run whose readings it is made of.
+    pub run: String,
+    /// What lay on the stage.
+    pub standard: String,
+    /// Mean temperature of the photometer, °C.
+    pub temperature_c: f64,
+}
+
+/// Responsivity, gains and linearity, from a white reference.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct White {
+    /// How it was made.
+    pub conditions: Conditions,
+    /// Counts per µs at gain ×1 for f·cos = 1 sr⁻¹ at nominal lamp output; red, green, blue.
+    pub responsivity: [f64; 3],
+    /// Relative standard uncertainty of each, the reference's own included.
+    pub u_responsivity: [f64; 3],
+    /// What the gain steps really amplify; the first is 1.
+    pub gains: [f64; 3],
+    /// Share of the counts that is lost at full scale; the loss grows with the square of the counts.
+    pub nonlinearity: f64,
+    /// Standard uncertainty of that share.
+    pub u_nonlinearity: f64,
+}
+
+/// Light that reaches the sensor past the specimen, from a black trap in its place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Trap {
+    /// How it was made.
+    pub conditions: Conditions,
+    /// Pose, and counts per µs at gain ×1 and nominal lamp output; red, green, blue.
+    pub points: Vec<(Pose, [f64; 3])>,
+    /// Standard uncertainty between the points, in the same unit.
+    pub u: [f64; 3],
+}
+
+/// By how much the arms' zeros are off, from the symmetry of a mirror's lobe.
+///
+/// A mirror tells the sum of both zeros alone: a difference looks like a tilted specimen, which the next specimen
+/// has differently. Half of the sum goes to each arm.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Zero {
+    /// How it was made.
+    pub conditions: Conditions,
+    /// To be added to each arm's measured angle, rad.
+    pub offset_rad: f64,
+    /// Its standard uncertainty, rad.
+    pub u_rad: f64,
+}
+
+/// From the sensor's colours to linear sRGB.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Colour {
+    /// How it was made.
+    pub conditions: Conditions,
+    /// Row by row; what the sensor's red, green and blue reflectance is multiplied by.
+    pub matrix: [[f64; 3]; 3],
+    /// Root mean square of what is left over the patches, relative to white.
+    pub residual: f64,
+}
+
+impl White {
+    /// What the rig file says, where no white reference was measured.
+    pub fn nominal(file: &RigFile) -> Self {
+        Self {
+            conditions: Conditions::default(),
+            responsivity: file.calibration.responsivity,
+            u_responsivity: [file.uncertainty.responsivity; 3],
+            gains: Gain::ALL.map(Gain::factor),
+            nonlinearity: 0.0,
+            u_nonlinearity: 0.0,
+        }
+    }
+
+    /// Counts that a linear photometer would have shown, of counts above dark, and by what relative share the
+    /// uncertainty of the non-linearity leaves them unsure.
+    ///
+    /// shown = s · (1 − k s / full scale), solved for s.
+    pub(crate) fn straighten(&self, net: f64, full_scale: f64) -> (f64, f64) {
+        let share = net / full_scale;
+        let root = (1.0 - 4.0 * self.nonlinearity * share).max(0.0).sqrt();
+        // 2 / (1 + root) is (1 − root) / (2 k share) without its 0/0.
+        (net * 2.0 / (1.0 + root), self.u_nonlinearity * share.abs())
+    }
+}
+
+impl Trap {
+    /// Stray light at a pose, counts per µs: of the points, weighted by the inverse square of their distance.
+    pub fn at(&self, pose: Pose) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        let mut weights = 0.0;
+        for (at, rates) in &self.points {
+            let square = (at.light - pose.light).powi(2) + (at.sensor - pose.sensor).powi(2);
+            let weight = 1.0 / (square + 1e-8);
+            weights += weight;
+            for (sum, rate) in sum.iter_mut().zip(rates) {
+                *sum += weight * rate;
+            }
+        }
+        if weights == 0.0 {
+            return sum;
+        }
+        sum.map(|sum| sum / weights)
+    }
+}
+
+impl Certificate {
+    /// Where the arms really were, when their encoders said `pose`.
+    pub fn aligned(&self, pose: Pose) -> Pose {
+        let offset = self.zero.as_ref().map_or(0.0, |zero| zero.offset_rad);
+        Pose {
+            light: ArmAngle::from_rad(pose.light.rad() + offset),
+            sensor: ArmAngle::from_rad(pose.sensor.rad() + offset),
+        }
+    }
+
+    /// When each part that it has was made, with its name.
+    pub fn parts(&self) -> impl Iterator<Item = (&'static str, &Conditions)> {
+        let white = self.white.as_ref().map(|part| ("white", &part.conditions));
+        let trap = self.trap.as_ref().map(|part| ("trap", &part.conditions));
+        let zero = self.zero.as_ref().map(|part| ("mirror", &part.conditions));
+        let colour = self.colour.as_ref().map(|part| ("colour", &part.conditions));
+        [white, trap, zero, colour].into_iter().flatten()
+    }
+}

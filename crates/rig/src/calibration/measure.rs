@@ -1,0 +1,314 @@
+//! Parts of a certificate from readings of a standard on the stage.
+
+use arms::Pose;
+
+use super::certificate::{Colour, Conditions, Trap, White, Zero};
+use super::reduction::Reduction;
+use super::{Filling, Taken};
+use crate::{Gain, RigError, RigFile};
+
+/// One geometry of a white reference's certificate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Certified {
+    /// Light and sensor.
+    pub pose: Pose,
+    /// Reflectance factor there (π f; 1 for a perfect diffuser), red, green, blue.
+    pub reflectance_factor: [f64; 3],
+}
+
+/// Readings of a ladder that are within this share of full scale tell about linearity.
+const LADDER: std::ops::Range<f64> = 0.02..0.97;
+/// A mirror's lobe must be seen over at least so many readings.
+const MIN_LOBE: usize = 5;
+/// Share of the peak below which a reading of a mirror's lobe does not count: the centre of a lobe must not hang on
+/// where the scan ends.
+const LOBE_FOOT: f64 = 0.02;
+
+impl White {
+    /// From readings of a white reference: at certified geometries, of which there may be one or a table, and a ladder
+    /// of overlapping exposures at one pose. `u_reference` is the relative standard uncertainty of its certificate.
+    /// `readings` are all of the run in the order of their time, dark ones too; `trap` what a black trap said before.
+    ///
+    /// # Errors
+    /// No usable reading at a certified geometry, or a ladder that says nothing.
+    pub fn measure(
+        file: &RigFile,
+        readings: &[Taken],
+        ladder: &[Taken],
+        certified: &[(Certified, Vec<Taken>)],
+        u_reference: f64,
+        trap: Option<&Trap>,
+    ) -> Result<Self, RigError> {
+        let nominal = Reduction::new(file, None, readings, &[]);
+        let mut white = straightness(file, &nominal, ladder)?;
+        let straight = nominal.with_white(white.clone());
+        let mut found: Vec<[f64; 3]> = Vec::new();
+        for (at, taken) in certified {
+            for taken in taken {
+                let Ok(rate) = straight.rate(taken) else { continue };
+                let stray = trap.map_or([0.0; 3], |trap| trap.at(taken.pose));
+                let cosine = match file.calibration.filling {
+                    Filling::Over => taken.pose.light.rad().cos(),
+                    Filling::Under => taken.pose.sensor.rad().cos(),
+                };
+                found.push(std::array::from_fn(|c| {
+                    let f = at.reflectance_factor[c] / std::f64::consts::PI;
+                    (rate.rgb[c] - stray[c]) / (f * cosine)
+                }));
+            }
+        }
+        if found.is_empty() {
+            return Err(RigError::Calibration {
+                what: "white reference",
+                why: "no usable reading at a certified geometry".to_owned(),
+            });
+        }
+        for c in 0..3 {
+            let (mean, u) = mean(found.iter().map(|r| r[c]));
+            white.responsivity[c] = mean;
+            white.u_responsivity[c] = (u / mean).hypot(u_reference);
+        }
+        white.conditions.temperature_c = temperature_c(readings);
+        Ok(white)
+    }
+}
+
+/// A reading of the ladder: its share of full scale, counts per time and gain, and the relative variance of those.
+type Rung = (f64, f64, f64);
+
+/// Gains and non-linearity from a ladder of overlapping exposures of one steady light.
+///
+/// Counts per time and gain fall with the counts like 1 − k · counts / full scale. Each gain and channel has a level of
+/// its own; k is one for all, by least squares about the mean of each group, and the levels tell the gains.
+fn straightness(file: &RigFile, nominal: &Reduction<'_>, ladder: &[Taken]) -> Result<White, RigError> {
+    let full_scale = f64::from(file.photometer.full_scale);
+    let group = |gain: Gain, c: usize| -> Vec<Rung> {
+        let of_gain = ladder.iter().filter(|taken| taken.counts.exposure.gain == gain);
+        let rungs = of_gain.filter_map(|taken| {
+            let rate = nominal.rate(taken).ok()?;
+            let share = rate.net[c] / full_scale;
+            let variance = (rate.u_counting[c] / rate.rgb[c]).powi(2);
+            LADDER.contains(&share).then_some((share, rate.rgb[c], variance))
+        });
+        rungs.collect()
+    };
+    let groups = Gain::ALL.map(|gain| [0, 1, 2].map(|c| group(gain, c)));
+    let (mut common, mut spread) = (0.0, 0.0);
+    for rungs in groups.iter().flatten() {
+        let (share, level) = (weighted(rungs, |r| r.0), weighted(rungs, |r| r.1));
+        for &(x, y, variance) in rungs {
+            common += (x - share) * (y / level - 1.0) / variance;
+            spread += (x - share).powi(2) / variance;
+        }
+    }
+    if spread == 0.0 {
+        return Err(RigError::Calibration {
+            what: "ladder of exposures",
+            why: "no two of its readings at one gain lie between 2 % and 97 % of full scale".to_owned(),
+        });
+    }
+    let k = -common / spread;
+    let level = |rungs: &[Rung]| weighted(rungs, |r| r.1 / (1.0 - k * r.0));
+    let nominal_gains = Gain::ALL.map(Gain::factor);
+    let gain = |g: usize| {
+        let ratios = (0..3).map(|c| level(&groups[g][c]) / level(&groups[0][c]));
+        let known: Vec<f64> = ratios.filter(|ratio| ratio.is_finite()).collect();
+        match known.len() {
+            0 => nominal_gains[g],
+            n => nominal_gains[g] * known.iter().sum::<f64>() / n as f64,
+        }
+    };
+    Ok(White {
+        gains: [1.0, gain(1), gain(2)],
+        nonlinearity: k,
+        u_nonlinearity: spread.sqrt().recip(),
+        ..White::nominal(file)
+    })
+}
+
+/// Mean of something over the rungs, weighted by their inverse variances; NaN of none.
+fn weighted(rungs: &[Rung], of: impl Fn(&Rung) -> f64) -> f64 {
+    let weights: f64 = rungs.iter().map(|r| 1.0 / r.2).sum();
+    rungs.iter().map(|r| of(r) / r.2).sum::<f64>() / weights
+}
+
+impl Trap {
+    /// From readings of a black trap at some poses. `readings` are all of the run in the order of their time.
+    ///
+    /// # Errors
+    /// No usable reading.
+    pub fn measure(
+        file: &RigFile,
+        readings: &[Taken],
+        trap: &[Taken],
+        white: Option<&White>,
+    ) -> Result<Self, RigError> {
+        let mut reduction = Reduction::new(file, None, readings, &[]);
+        if let Some(white) = white {
+            reduction = reduction.with_white(white.clone());
+        }
+        let mut points = Vec::new();
+        let mut variance = [0.0; 3];
+        for taken in trap {
+            let Ok(rate) = reduction.rate(taken) else { continue };
+            for (sum, u) in variance.iter_mut().zip(rate.u_counting) {
+                *sum += u * u;
+            }
+            points.push((taken.pose, rate.rgb));
+        }
+        if points.is_empty() {
+            return Err(RigError::Calibration {
+                what: "black trap",
+                why: "no usable reading".to_owned(),
+            });
+        }
+        let n = points.len() as f64;
+        Ok(Self {
+            conditions: Conditions {
+                temperature_c: temperature_c(readings),
+                ..Conditions::default()
+            },
+            points,
+            u: variance.map(|sum| (sum / n).sqrt()),
+        })
+    }
+}
+
+impl Zero {
+    /// From scans of the light across the lobe of a mirror-like specimen, the sensor standing. `readings` are all of
+    /// the run in the order of their time.
+    ///
+    /// The lobe is symmetrical about the mirror direction, so its centre of gravity stands where the true angles add
+    /// up to 0.
+    ///
+    /// # Errors
+    /// Too few readings within a lobe.
+    pub fn measure(file: &RigFile, readings: &[Taken], scans: &[Vec<Taken>]) -> Result<Self, RigError> {
+        let reduction = Reduction::new(file, None, readings, &[]);
+        let mut sums = Vec::new();
+        for scan in scans {
+            let lobe: Vec<(f64, f64)> = scan
+                .iter()
+                .filter_map(|taken| {
+                    let f = reduction.reflectance(taken).ok()?.raw;
+                    let sum = taken.pose.light.rad() + taken.pose.sensor.rad();
+                    Some((sum, f.iter().sum::<f64>()))
+                })
+                .collect();
+            let peak = lobe.iter().map(|point| point.1).fold(0.0, f64::max);
+            let within: Vec<_> = lobe.iter().filter(|point| point.1 > LOBE_FOOT * peak).collect();
+            if within.len() < MIN_LOBE {
+                return Err(RigError::Calibration {
+                    what: "mirror",
+                    why: format!(
+                        "{} readings within its lobe, at least {MIN_LOBE} are needed: is it a mirror, and near the mirror direction?",
+                        within.len()
+                    ),
+                });
+            }
+            let weight: f64 = within.iter().map(|point| point.1).sum();
+            sums.push(within.iter().map(|point| point.0 * point.1).sum::<f64>() / weight);
+        }
+        if sums.is_empty() {
+            return Err(RigError::Calibration {
+                what: "mirror",
+                why: "no scan across its lobe".to_owned(),
+            });
+        }
+        let step = file.arms[0]
+            .axis
+            .resolution_rad()
+            .max(file.arms[1].axis.resolution_rad());
+        let (sum, u) = mean(sums.iter().copied());
+        // Never surer than a tenth of the step with which the lobe was seen.
+        Ok(Self {
+            conditions: Conditions {
+                temperature_c: temperature_c(readings),
+                ..Conditions::default()
+            },
+            offset_rad: -sum / 2.0,
+            u_rad: (u / 2.0).max(step / 10.0),
+        })
+    }
+}
+
+impl Colour {
+    /// The matrix that takes what the sensor says of some patches closest to what they are: least squares over pairs of
+    /// the sensor's own reflectance and linear sRGB, both in the same unit.
+    ///
+    /// # Errors
+    /// Fewer than three patches, or patches that differ too little in colour.
+    pub fn measure(patches: &[([f64; 3], [f64; 3])]) -> Result<Self, RigError> {
+        let product = |a: usize, b: usize, of: &dyn Fn(&([f64; 3], [f64; 3]), usize) -> f64| -> f64 {
+            patches.iter().map(|patch| patch.0[a] * of(patch, b)).sum()
+        };
+        let normal: [[f64; 3]; 3] =
+            std::array::from_fn(|a| std::array::from_fn(|b| product(a, b, &|patch, b| patch.0[b])));
+        let inverse = inverse(&normal).ok_or_else(|| RigError::Calibration {
+            what: "colour patches",
+            why: format!(
+                "{} patches do not span the colours; at least three that differ are needed",
+                patches.len()
+            ),
+        })?;
+        let matrix: [[f64; 3]; 3] = std::array::from_fn(|row| {
+            let right: [f64; 3] = std::array::from_fn(|a| product(a, row, &|patch, b| patch.1[b]));
+            std::array::from_fn(|a| (0..3).map(|b| inverse[a][b] * right[b]).sum())
+        });
+        let squares: f64 = patches
+            .iter()
+            .flat_map(|(sensor, truth)| {
+                (0..3).map(move |row| {
+                    let said: f64 = (0..3).map(|a| matrix[row][a] * sensor[a]).sum();
+                    (said - truth[row]).powi(2)
+                })
+            })
+            .sum();
+        let white = patches.iter().flat_map(|patch| patch.1).fold(0.0, f64::max);
+        Ok(Self {
+            conditions: Conditions::default(),
+            matrix,
+            residual: (squares / (3 * patches.len()) as f64).sqrt() / white,
+        })
+    }
+}
+
+/// Inverse of a symmetric matrix by cofactors; `None` where it is singular to nine digits.
+fn inverse(m: &[[f64; 3]; 3]) -> Option<[[f64; 3]; 3]> {
+    let cofactor = |row: usize, column: usize| {
+        let [r0, r1] = [(row + 1) % 3, (row + 2) % 3];
+        let [c0, c1] = [(column + 1) % 3, (column + 2) % 3];
+        m[r0][c0] * m[r1][c1] - m[r0][c1] * m[r1][c0]
+    };
+    let determinant: f64 = (0..3).map(|column| m[0][column] * cofactor(0, column)).sum();
+    let scale = (m[0][0] + m[1][1] + m[2][2]).powi(3);
+    if !(determinant.abs() > 1e-9 * scale) {
+        return None;
+    }
+    Some(std::array::from_fn(|a| {
+        std::array::from_fn(|b| cofactor(b, a) / determinant)
+    }))
+}
+
+/// Mean and the standard uncertainty of it; of a single value that is 0.
+fn mean(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
+    let n = values.clone().count() as f64;
+    let mean = values.clone().sum::<f64>() / n;
+    let squares: f64 = values.map(|value| (value - mean).powi(2)).sum();
+    (
+        mean,
+        if n > 1.0 {
+            (squares / (n * (n - 1.0))).sqrt()
+        } else {
+            0.0
+        },
+    )
+}
+
+fn temperature_c(readings: &[Taken]) -> f64 {
+    let sum: f64 = readings
+        .iter()
+        .map(|taken| f64::from(taken.counts.temperature_c))
+        .sum();
+    sum / readings.len().max(1) as f64
+}

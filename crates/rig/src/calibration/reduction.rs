@@ -1,0 +1,234 @@
+use arms::Pose;
+
+use super::certificate::{Certificate, White};
+use super::lamp::{Drift, Lamp};
+use super::{Darks, Filling, MIN_COSINE, MIN_LAMP, Taken, Unusable};
+use crate::{RigFile, Uncertainties};
+
+/// From the counts of one run to reflectance: the rig file, the certificate, the run's dark readings and its visits to
+/// the reference pose.
+#[derive(Clone, Debug)]
+pub struct Reduction<'a> {
+    file: &'a RigFile,
+    certificate: Certificate,
+    white: White,
+    darks: Darks,
+    drift: Drift,
+}
+
+/// BRDF from one reading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reflectance {
+    /// Linear sRGB in sr⁻¹; the sensor's own colours where no colour matrix was measured.
+    pub rgb: [f64; 3],
+    /// In the sensor's own colours, sr⁻¹.
+    pub raw: [f64; 3],
+    /// How sure `rgb` is, as far as one reading can tell.
+    pub u: Budget,
+}
+
+/// Standard uncertainty of a reflectance by its origin, red, green, blue, sr⁻¹. What depends on how the reflectance
+/// varies with the angles is not in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Budget {
+    /// Photons, electrons and the converter, in this reading alone: signal and monitor.
+    pub counting: [f64; 3],
+    /// The dark level: the same for all readings of a gain between two dark sets.
+    pub dark: [f64; 3],
+    /// The lamp between two visits to the reference pose; 0 with a monitor.
+    pub drift: [f64; 3],
+    /// Responsivity and the white reference: the same for all readings.
+    pub reference: [f64; 3],
+    /// Linearity: the same sign for all readings.
+    pub linearity: [f64; 3],
+    /// Stray light: the same amount of light in all readings.
+    pub stray: [f64; 3],
+}
+
+/// Counts per µs at gain ×1 and nominal lamp output.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Rate {
+    pub(crate) rgb: [f64; 3],
+    /// Counts above dark.
+    pub(crate) net: [f64; 3],
+    /// Standard uncertainties: of this reading, of the dark level, of the lamp; linearity, relative.
+    pub(crate) u_counting: [f64; 3],
+    u_dark: [f64; 3],
+    u_lamp: f64,
+    u_linearity: [f64; 3],
+}
+
+impl<'a> Reduction<'a> {
+    /// For the readings of a run in the order of their time, of which `visits` were taken at the reference pose.
+    pub fn new(
+        file: &'a RigFile,
+        certificate: Option<&Certificate>,
+        readings: &[Taken],
+        visits: &[Taken],
+    ) -> Self {
+        let certificate = certificate.cloned().unwrap_or_default();
+        let white = certificate.white.clone().unwrap_or_else(|| White::nominal(file));
+        let mut reduction = Self {
+            file,
+            certificate,
+            white,
+            darks: Darks::fit(readings),
+            drift: Drift::default(),
+        };
+        if file.visits.lamp == Lamp::Visits {
+            let signals = visits.iter().filter_map(|visit| {
+                let rate = reduction.rate(visit).ok()?;
+                let sum: f64 = rate.rgb.iter().sum();
+                let variance: f64 = (0..3)
+                    .map(|c| rate.u_counting[c].powi(2) + rate.u_dark[c].powi(2))
+                    .sum();
+                Some((*visit, sum, variance.sqrt() / sum))
+            });
+            reduction.drift = Drift::new(signals.collect::<Vec<_>>());
+        }
+        reduction
+    }
+
+    /// The same with another white reference.
+    pub(crate) fn with_white(mut self, white: White) -> Self {
+        self.white = white;
+        self
+    }
+
+    /// Where the arms really were, when their encoders said `pose`.
+    pub fn aligned(&self, pose: Pose) -> Pose {
+        self.certificate.aligned(pose)
+    }
+
+    /// BRDF from one reading.
+    ///
+    /// f = M · ((counts − dark) / (gain · t · lamp) − stray) / (responsivity · cos θ), with θ = θ_i where the light
+    /// overfills the field of the sensor, θ_o where it underfills it (ASTM E2387, Nicodemus), and the lamp by its
+    /// monitor or by visits to the reference pose. Of a black specimen the values scatter about 0: they may be
+    /// slightly negative, and must stay so until averages are taken.
+    ///
+    /// # Errors
+    /// Counts that say nothing, and why.
+    pub fn reflectance(&self, taken: &Taken) -> Result<Reflectance, Unusable> {
+        let pose = self.aligned(taken.pose);
+        let cosine = match self.file.calibration.filling {
+            Filling::Over => pose.light.rad().cos(),
+            Filling::Under => pose.sensor.rad().cos(),
+        };
+        if cosine.is_nan() || cosine < MIN_COSINE {
+            return Err(Unusable::Grazing);
+        }
+        let rate = self.rate(taken)?;
+        let (stray, u_stray) = self.stray(pose);
+        let scale = self.white.responsivity.map(|r| 1.0 / (r * cosine));
+        let raw: [f64; 3] = std::array::from_fn(|c| (rate.rgb[c] - stray[c]) * scale[c]);
+        let scaled = |u: [f64; 3]| std::array::from_fn::<f64, 3, _>(|c| u[c] * scale[c]);
+        let relative = |u: [f64; 3]| std::array::from_fn::<f64, 3, _>(|c| u[c] * raw[c].abs());
+        let u = Budget {
+            counting: scaled(rate.u_counting),
+            dark: scaled(rate.u_dark),
+            drift: relative([rate.u_lamp; 3]),
+            reference: relative(self.white.u_responsivity),
+            linearity: relative(rate.u_linearity),
+            stray: scaled(u_stray),
+        };
+        Ok(self.colour(raw, u))
+    }
+
+    /// Counts per µs at gain ×1 and nominal lamp output, stray light included.
+    ///
+    /// # Errors
+    /// Counts that say nothing, and why.
+    pub(crate) fn rate(&self, taken: &Taken) -> Result<Rate, Unusable> {
+        let counts = &taken.counts;
+        if counts.saturated {
+            return Err(Unusable::Saturated);
+        }
+        let exposure = counts.exposure;
+        let dark = self
+            .darks
+            .counts(taken.time_s, exposure)
+            .ok_or(Unusable::Dark(exposure.gain))?;
+        let time_us = f64::from(exposure.integration_us);
+        let known = &self.file.uncertainty;
+        let gain = self.white.gains[exposure.gain as usize];
+        let full_scale = f64::from(self.file.photometer.full_scale);
+        let (lamp, u_monitor, u_lamp) = match self.file.visits.lamp {
+            Lamp::Visits => {
+                let (level, u) = self.drift.level(taken.time_s);
+                (level, 0.0, u / level)
+            }
+            Lamp::Monitor => {
+                let net = f64::from(counts.monitor) - dark.monitor;
+                let u = (known.variance(net, 1.0) + dark.u_monitor.powi(2)).sqrt();
+                (net / (self.file.calibration.monitor * time_us), u / net, 0.0)
+            }
+        };
+        // NaN, of a drift that nobody saw, is no light either.
+        if lamp.is_nan() || lamp < MIN_LAMP {
+            return Err(Unusable::Lamp);
+        }
+        let scale = 1.0 / (gain * time_us * lamp);
+        let mut rate = Rate {
+            u_lamp,
+            ..Rate::default()
+        };
+        for c in 0..3 {
+            let net = f64::from(counts.rgb[c]) - dark.rgb[c];
+            let (straight, u_linearity) = self.white.straighten(net, full_scale);
+            rate.rgb[c] = straight * scale;
+            rate.net[c] = net;
+            let own = known.variance(f64::from(counts.rgb[c]) - dark.offset[c], gain);
+            rate.u_counting[c] = (own * scale * scale + (u_monitor * rate.rgb[c]).powi(2)).sqrt();
+            rate.u_dark[c] = dark.u_rgb[c] * scale;
+            rate.u_linearity[c] = u_linearity;
+        }
+        Ok(rate)
+    }
+
+    /// Stray light at a pose and its standard uncertainty, counts per µs.
+    fn stray(&self, pose: Pose) -> ([f64; 3], [f64; 3]) {
+        match &self.certificate.trap {
+            Some(trap) => (trap.at(pose), trap.u),
+            None => {
+                let u = self.file.uncertainty.stray_per_sr;
+                ([0.0; 3], self.white.responsivity.map(|r| r * u))
+            }
+        }
+    }
+
+    fn colour(&self, raw: [f64; 3], u: Budget) -> Reflectance {
+        let Some(colour) = &self.certificate.colour else {
+            return Reflectance { rgb: raw, raw, u };
+        };
+        let row = |of: &[f64; 3], row: &[f64; 3]| row.iter().zip(of).map(|(m, x)| m * x).sum::<f64>();
+        let squares = |of: &[f64; 3], row: &[f64; 3]| {
+            let sum: f64 = row.iter().zip(of).map(|(m, x)| (m * x).powi(2)).sum();
+            sum.sqrt()
+        };
+        let mixed = |of: [f64; 3]| colour.matrix.map(|line| squares(&of, &line));
+        Reflectance {
+            rgb: colour.matrix.map(|line| row(&raw, &line)),
+            raw,
+            u: Budget {
+                counting: mixed(u.counting),
+                dark: mixed(u.dark),
+                drift: mixed(u.drift),
+                reference: mixed(u.reference),
+                linearity: mixed(u.linearity),
+                stray: mixed(u.stray),
+            },
+        }
+    }
+}
+
+impl Uncertainties {
+    /// Variance of counts above the photometer's offset, taken with a gain: shot noise, converter, rounding.
+    fn variance(&self, counts: f64, gain: f64) -> f64 {
+        let shot = match self.electrons_per_count {
+            0.0 => 0.0,
+            electrons => gain * counts.max(0.0) / electrons,
+        };
+        shot + self.read_noise_counts.powi(2) + 1.0 / 12.0
+    }
+}

@@ -1,0 +1,110 @@
+//! `[calibration]` and `[uncertainty]`.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use arms::{ArmAngle, Envelope, Pose};
+use toml::Spanned;
+
+use crate::file::raw::{RawCalibration, RawUncertainty};
+use crate::file::source::Source;
+use crate::file::{Certificates, Uncertainties, Visits};
+use crate::{Calibration, Filling, Lamp, RigError};
+
+/// Minutes in a day.
+const DAY_MIN: f64 = 1440.0;
+/// Hours in ten years.
+const DECADE_H: f64 = 87_600.0;
+
+pub(super) fn constants(source: &Source<'_>, raw: &RawCalibration) -> Result<Calibration, RigError> {
+    let fillings = [("over", Filling::Over), ("under", Filling::Under)];
+    let filling = source.one_of("calibration.filling", &raw.filling, &fillings)?;
+    let positive = |value: f64| value > 0.0 && value.is_finite();
+    let responsivity = *raw.responsivity.get_ref();
+    if !responsivity.into_iter().all(positive) {
+        let found = format!("{responsivity:?}");
+        return Err(source.refuse(
+            "calibration.responsivity",
+            &raw.responsivity,
+            found,
+            "three finite values > 0",
+        ));
+    }
+    let monitor = *raw.monitor.get_ref();
+    if !positive(monitor) {
+        return Err(source.refuse("calibration.monitor", &raw.monitor, monitor, "a finite value > 0"));
+    }
+    Ok(Calibration {
+        filling,
+        responsivity,
+        monitor,
+    })
+}
+
+pub(super) fn visits(
+    source: &Source<'_>,
+    raw: &RawCalibration,
+    envelope: &Envelope,
+) -> Result<Visits, RigError> {
+    let minutes = |key: &str, value: &Spanned<f64>, least: f64| {
+        let minutes = source.within(&format!("calibration.{key}"), value, least..=DAY_MIN)?;
+        Ok(Duration::from_secs_f64(minutes * 60.0))
+    };
+    let degrees = |key: &str, value: &Spanned<f64>| {
+        source
+            .within(&format!("calibration.{key}"), value, -90.0..=90.0)
+            .map(ArmAngle::from_deg)
+    };
+    let lamps = [("monitor", Lamp::Monitor), ("visits", Lamp::Visits)];
+    let visits = Visits {
+        dark_every: minutes("dark_every_min", &raw.dark_every_min, 0.0)?,
+        lamp: source.one_of("calibration.lamp", &raw.lamp, &lamps)?,
+        reference_every: minutes("reference_every_min", &raw.reference_every_min, 0.1)?,
+        reference: Pose {
+            light: degrees("reference_light_deg", &raw.reference_light_deg)?,
+            sensor: degrees("reference_sensor_deg", &raw.reference_sensor_deg)?,
+        },
+    };
+    let reachable = envelope.check_pose(visits.reference).is_ok() && !envelope.occluded(visits.reference);
+    if visits.lamp == Lamp::Visits && !reachable {
+        return Err(source.refuse(
+            "calibration.reference_light_deg",
+            &raw.reference_light_deg,
+            visits.reference.light.deg(),
+            "a pose within [envelope] at which the arms do not shadow each other",
+        ));
+    }
+    Ok(visits)
+}
+
+pub(super) fn certificates(source: &Source<'_>, raw: &RawCalibration) -> Result<Certificates, RigError> {
+    let max_age_h = source.within("calibration.max_age_h", &raw.max_age_h, 0.1..=DECADE_H)?;
+    if raw.directory.get_ref().is_empty() {
+        return Err(source.refuse("calibration.directory", &raw.directory, "empty", "a directory"));
+    }
+    let words = [("none", false), ("required", true)];
+    Ok(Certificates {
+        required: source.one_of("calibration.certificate", &raw.certificate, &words)?,
+        directory: PathBuf::from(raw.directory.get_ref()),
+        max_age: Duration::from_secs_f64(max_age_h * 3600.0),
+    })
+}
+
+pub(super) fn uncertainty(source: &Source<'_>, raw: &RawUncertainty) -> Result<Uncertainties, RigError> {
+    let within = |key: &str, value: &Spanned<f64>, max: f64| {
+        source.within(&format!("uncertainty.{key}"), value, 0.0..=max)
+    };
+    let radians = |key: &str, value: &Spanned<f64>| within(key, value, 10.0).map(f64::to_radians);
+    Ok(Uncertainties {
+        electrons_per_count: within("electrons_per_count", &raw.electrons_per_count, 1e6)?,
+        read_noise_counts: within("read_noise_counts", &raw.read_noise_counts, 1e4)?,
+        responsivity: within("responsivity_percent", &raw.responsivity_percent, 100.0)? / 100.0,
+        stray_per_sr: within("stray_per_sr", &raw.stray_per_sr, 1.0)?,
+        angle_rad: radians("angle_deg", &raw.angle_deg)?,
+        zero_rad: radians("zero_deg", &raw.zero_deg)?,
+        apertures_rad: [
+            radians("source_aperture_deg", &raw.source_aperture_deg)?,
+            radians("detector_aperture_deg", &raw.detector_aperture_deg)?,
+        ],
+    })
+}
