@@ -16,6 +16,14 @@ pub enum JournalError {
         /// Why.
         source: std::io::Error,
     },
+    /// The store that keeps the journal refused.
+    #[error("cannot keep the journal of run {run}")]
+    Store {
+        /// Which run.
+        run: String,
+        /// Why.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
     /// Another process writes this journal.
     #[error("the journal {path} is in use by another process")]
     Locked {

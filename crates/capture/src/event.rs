@@ -1,4 +1,5 @@
 use arms::Pose;
+use rig::{Device, FaultKind};
 use serde::Serialize;
 use sweep::Sweep;
 
@@ -14,6 +15,8 @@ pub enum Command {
     /// Finish the reading and hold, lamp on, until told otherwise.
     Pause,
     /// Finish the reading, hold the arms, lamp off, end; the run can be resumed.
+    Finish,
+    /// Decelerate now on the profiles and hold, lamp off, end; the run can be resumed.
     Stop,
     /// Stop the arms at once as the rig file says, lamp off, end.
     Estop,
@@ -61,6 +64,22 @@ pub enum Event {
     Reading {
         /// The reading.
         reading: Box<Reading>,
+    },
+    /// A resumed run measured a pose of its finished part again.
+    Repeat {
+        /// The new reading, with the step that it repeats.
+        reading: Box<Reading>,
+        /// By how much the brightest channel differs from before, relative to the lamp monitor.
+        difference_rel: f64,
+    },
+    /// A fault of the rig ends it.
+    Fault {
+        /// What kind.
+        kind: FaultKind,
+        /// The device at fault, where one can be named.
+        device: Option<Device>,
+        /// In words, with its causes.
+        fault: String,
     },
     /// How far it is.
     Progress {

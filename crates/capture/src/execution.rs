@@ -1,7 +1,7 @@
 use std::time::{Duration, SystemTime};
 
-use rig::{Drive, Exposure, Gain, Identity, Rig, RigFile};
-use sweep::{Plan, Step};
+use rig::{Counts, Drive, Exposure, Gain, Identity, Rig, RigFile};
+use sweep::{Plan, Step, Sweep};
 use tokio::sync::watch;
 
 use crate::clock::DeviceClock;
@@ -97,11 +97,15 @@ impl<'a, R: Rig> Execution<'a, R> {
     pub(crate) async fn all(&mut self) -> Result<(), Interrupt<R::Error>> {
         self.state(State::Identifying);
         self.begin().await?;
+        self.drive.rest().await?;
         self.state(State::Engaging);
         self.touched = true;
         self.drive.engage_all().await?;
         self.state(State::Running);
         self.report_progress();
+        if self.done.contains(&false) {
+            self.repeat().await?;
+        }
         let mut next = 0;
         loop {
             while let Some(step) = self.plan.steps.get(next).cloned() {
@@ -133,7 +137,7 @@ impl<'a, R: Rig> Execution<'a, R> {
             self.obey().await?;
             self.mark = self.look().await?;
         };
-        self.journal.append(&Record::Extension(extension.clone()))?;
+        self.append(&Record::Extension(extension.clone())).await?;
         let added = !extension.steps.is_empty();
         let steps = self.plan.steps.len() + extension.steps.len();
         self.done.resize(steps, false);
@@ -157,11 +161,44 @@ impl<'a, R: Rig> Execution<'a, R> {
         let ticks = self.drive.ticks().await?;
         self.clock = DeviceClock::new(last_ticks(self.journal.records()), ticks);
         self.mark = self.clock.last();
-        self.journal.append(&Record::Begin {
+        self.append(&Record::Begin {
             identities: found,
             device_ticks: self.mark,
             at: now(),
-        })?;
+        })
+        .await
+    }
+
+    /// Measures a pose of the finished part again and records by how much it differs.
+    async fn repeat(&mut self) -> Result<(), Interrupt<R::Error>> {
+        let Some(before) = reference(self.journal.records()).cloned() else {
+            return Ok(());
+        };
+        self.switch_lamp(true).await?;
+        let retries = self.drive.retries();
+        let measured = self.travel_anew(before.goal).await?;
+        let counts = self.drive.expose(before.counts.exposure).await?;
+        let mut reading = Reading {
+            accepted: false,
+            sweep: Sweep::Repeat,
+            measured,
+            counts,
+            device_ticks: self.clock.unwrap(counts.ticks),
+            retries: self.drive.retries() - retries,
+            ..before.clone()
+        };
+        reading.flags = self.flags(&reading);
+        let difference_rel = difference_rel(&before.counts, &counts);
+        let repeat = Record::Repeat {
+            reading: reading.clone(),
+            difference_rel,
+        };
+        self.append(&repeat).await?;
+        self.mark = self.clock.last();
+        self.emit(Event::Repeat {
+            reading: Box::new(reading),
+            difference_rel,
+        });
         Ok(())
     }
 
@@ -204,7 +241,7 @@ impl<'a, R: Rig> Execution<'a, R> {
             };
             reading.flags = self.flags(&reading);
             retries = self.drive.retries();
-            self.record(reading, step)?;
+            self.record(reading, step).await?;
             match better {
                 Some(better) => exposure = better,
                 None => break,
@@ -215,16 +252,21 @@ impl<'a, R: Rig> Execution<'a, R> {
 
     /// Drives to a step's pose; from wherever the arms are where its own path does not lead on.
     async fn travel(&mut self, step: &Step) -> Result<arms::Pose, Interrupt<R::Error>> {
-        let snapshot = if self.on_path {
-            self.drive.travel(&step.path).await?
+        let measured = if self.on_path {
+            self.drive.travel(&step.path).await?.pose()
         } else {
-            let from = self.drive.snapshot().await?.pose();
-            let mechanics = mechanics(self.file, Some(from));
-            let path = sweep::way(&mechanics, from, step.pose()).map_err(Interrupt::Way)?;
-            self.drive.travel(&path).await?
+            self.travel_anew(step.pose()).await?
         };
         self.on_path = true;
-        Ok(snapshot.pose())
+        Ok(measured)
+    }
+
+    /// Drives to a pose from wherever the arms are.
+    async fn travel_anew(&mut self, to: arms::Pose) -> Result<arms::Pose, Interrupt<R::Error>> {
+        let from = self.drive.snapshot().await?.pose();
+        let mechanics = mechanics(self.file, Some(from));
+        let path = sweep::way(&mechanics, from, to).map_err(Interrupt::Way)?;
+        Ok(self.drive.travel(&path).await?.pose())
     }
 
     fn flags(&self, reading: &Reading) -> Vec<Flag> {
@@ -240,8 +282,8 @@ impl<'a, R: Rig> Execution<'a, R> {
     }
 
     /// Makes a reading durable, then known.
-    fn record(&mut self, reading: Reading, step: &Step) -> Result<(), Interrupt<R::Error>> {
-        self.journal.append(&Record::Reading(reading.clone()))?;
+    async fn record(&mut self, reading: Reading, step: &Step) -> Result<(), Interrupt<R::Error>> {
+        self.append(&Record::Reading(reading.clone())).await?;
         self.attempts[step.index] += 1;
         let accepted = reading.accepted;
         if accepted {
@@ -259,6 +301,19 @@ impl<'a, R: Rig> Execution<'a, R> {
             self.report_progress();
         }
         Ok(())
+    }
+
+    /// Makes a record durable. A medium that is slow does not let the watchdogs starve.
+    async fn append(&mut self, record: &Record) -> Result<(), Interrupt<R::Error>> {
+        let every = self.look_every();
+        let mut append = self.journal.append(record);
+        loop {
+            match tokio::time::timeout(every, &mut append).await {
+                Ok(result) => return Ok(result?),
+                Err(_) if self.touched => drop(self.drive.snapshot().await?),
+                Err(_) => {}
+            }
+        }
     }
 
     /// Switches the lamp, and waits for steady light.
@@ -289,6 +344,7 @@ impl<'a, R: Rig> Execution<'a, R> {
             let command = *self.control.borrow_and_update();
             match command {
                 Command::Run => break,
+                Command::Finish => return Err(Interrupt::Finish),
                 Command::Stop => return Err(Interrupt::Stop),
                 Command::Estop => return Err(Interrupt::Estop),
                 Command::Pause => {}
@@ -347,10 +403,26 @@ fn readings(records: &[Record]) -> impl Iterator<Item = &Reading> {
     })
 }
 
+/// The reading that is measured again when a run goes on: the last one that is bright enough and not too bright.
+fn reference(records: &[Record]) -> Option<&Reading> {
+    let sound = |reading: &&Reading| {
+        let poor = [Flag::Saturated, Flag::Dim];
+        reading.accepted && reading.lamp && !reading.flags.iter().any(|flag| poor.contains(flag))
+    };
+    readings(records).filter(sound).last()
+}
+
+/// Relative difference of the channel that was brightest, each relative to the lamp monitor.
+fn difference_rel(before: &Counts, after: &Counts) -> f64 {
+    let brightest = (0..3).max_by_key(|&c| before.rgb[c]).unwrap_or(0);
+    let level = |counts: &Counts| f64::from(counts.rgb[brightest]) / f64::from(counts.monitor.max(1));
+    level(after) / level(before).max(f64::MIN_POSITIVE) - 1.0
+}
+
 /// The last device time in a journal.
 fn last_ticks(records: &[Record]) -> Option<u64> {
     records.iter().rev().find_map(|record| match record {
-        Record::Reading(reading) => Some(reading.device_ticks),
+        Record::Reading(reading) | Record::Repeat { reading, .. } => Some(reading.device_ticks),
         Record::Begin { device_ticks, .. } => Some(*device_ticks),
         Record::End { device_ticks, .. } => *device_ticks,
         Record::Header(_) | Record::Extension(_) => None,

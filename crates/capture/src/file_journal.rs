@@ -2,6 +2,7 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
+use async_trait::async_trait;
 use crc::{CRC_32_ISO_HDLC, Crc};
 
 use crate::{Header, Journal, JournalError, Record};
@@ -45,7 +46,7 @@ impl FileJournal {
             length: 0,
             torn: false,
         };
-        journal.append(&Record::Header(header))?;
+        journal.write(&Record::Header(header))?;
         // The name is durable once the directory is.
         let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
         let directory = File::open(parent.unwrap_or(Path::new(".")));
@@ -91,6 +92,20 @@ impl FileJournal {
         Ok(parse(&bytes, path)?.0)
     }
 
+    /// Writes records in the form of a journal file, for one that is made whole from another place.
+    ///
+    /// # Errors
+    /// What `out` says.
+    pub fn copy<'a>(
+        records: impl IntoIterator<Item = &'a Record>,
+        out: &mut impl Write,
+    ) -> std::io::Result<()> {
+        for record in records {
+            out.write_all(line(record)?.as_bytes())?;
+        }
+        Ok(())
+    }
+
     /// Makes the last whole record the end of the file.
     fn cut(&mut self) -> Result<(), JournalError> {
         let cut = self
@@ -102,10 +117,9 @@ impl FileJournal {
         self.torn = false;
         Ok(())
     }
-}
 
-impl Journal for FileJournal {
-    fn append(&mut self, record: &Record) -> Result<(), JournalError> {
+    /// Appends a record and returns once it is durable.
+    fn write(&mut self, record: &Record) -> Result<(), JournalError> {
         if self.torn {
             self.cut()?;
         }
@@ -124,6 +138,13 @@ impl Journal for FileJournal {
         self.length += line.len() as u64;
         self.records.push(record.clone());
         Ok(())
+    }
+}
+
+#[async_trait]
+impl Journal for FileJournal {
+    async fn append(&mut self, record: &Record) -> Result<(), JournalError> {
+        self.write(record)
     }
 
     fn records(&self) -> &[Record] {
@@ -221,7 +242,7 @@ mod tests {
             device_ticks: None,
             at: String::new(),
         };
-        let error = journal.append(&end).unwrap_err();
+        let error = journal.write(&end).unwrap_err();
         assert!(matches!(error, JournalError::Io { what: "write", .. }), "{error}");
         assert!(journal.records().is_empty());
     }

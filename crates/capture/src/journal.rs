@@ -1,3 +1,4 @@
+use async_trait::async_trait;
 use rig::{Certificate, Identity};
 use serde::{Deserialize, Serialize};
 use sweep::{Plan, Step};
@@ -95,6 +96,14 @@ pub enum Record {
     Reading(Reading),
     /// Steps were added to the plan.
     Extension(Extension),
+    /// A resumed run measured a pose of its finished part again, to show whether lamp, stage or specimen changed
+    /// meanwhile. Nothing is made of it.
+    Repeat {
+        /// The new reading, with the step that it repeats.
+        reading: Reading,
+        /// By how much the brightest channel differs from before, relative to the lamp monitor; dark counts included.
+        difference_rel: f64,
+    },
     /// An execution ended.
     End {
         /// How.
@@ -107,12 +116,16 @@ pub enum Record {
 }
 
 /// Where records are kept: append-only, in order.
+#[async_trait]
 pub trait Journal: Send {
     /// Appends a record and returns once it is durable.
     ///
+    /// An append that is dropped half-way may or may not have happened; the next one settles that first, so that
+    /// [`Self::records`] is always what is kept.
+    ///
     /// # Errors
     /// The medium refused (disk full); what was appended before is still there.
-    fn append(&mut self, record: &Record) -> Result<(), JournalError>;
+    async fn append(&mut self, record: &Record) -> Result<(), JournalError>;
 
     /// All records, oldest first.
     fn records(&self) -> &[Record];

@@ -3,7 +3,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::pin::Pin;
 use std::task::Poll;
 
-use rig::{Drive, Rig};
+use rig::{Drive, Fault, Rig};
 use tokio::sync::watch;
 
 use crate::execution::{Execution, Interrupt};
@@ -21,8 +21,8 @@ pub type Thinking = Pin<Box<dyn Future<Output = Extension> + Send>>;
 ///
 /// First every device is asked who it is; nothing moves before that is as the rig file says, and on resuming as the
 /// journal says. Then the steps in their order, each reading durable in the journal before the next motion starts.
-/// Commands come over `control`; what happens is told to `on_event`. A [`Command::Stop`] ends it after the reading
-/// in hand, a [`Command::Estop`] at once.
+/// Commands come over `control`; what happens is told to `on_event`. A [`Command::Finish`] ends it after the reading
+/// in hand, a [`Command::Stop`] and a [`Command::Estop`] at once, each in its way.
 ///
 /// On every way out, also when `on_event` panics, the lamp goes off, the arms stop and the watchdogs are disarmed,
 /// and the journal says how it ended. Only a future that is dropped half-way cannot do that: then the bus falls
@@ -79,7 +79,7 @@ async fn begin<R: Rig>(
     let result = guarded(async {
         let result = tokio::select! {
             biased;
-            () = estop(control) => Err(Interrupt::Estop),
+            interrupt = at_once(control) => Err(interrupt),
             result = execution.all() => result,
         };
         execution.state(State::ShuttingDown);
@@ -95,15 +95,17 @@ async fn begin<R: Rig>(
     }
 }
 
-/// Returns once an emergency stop is asked for.
-async fn estop(mut control: watch::Receiver<Command>) {
-    if control
-        .wait_for(|&command| command == Command::Estop)
+/// Returns once a stop or an emergency stop is asked for.
+async fn at_once<E: Fault>(mut control: watch::Receiver<Command>) -> Interrupt<E> {
+    let asked = control
+        .wait_for(|command| matches!(command, Command::Stop | Command::Estop))
         .await
-        .is_err()
-    {
+        .map(|command| *command);
+    match asked {
+        Ok(Command::Estop) => Interrupt::Estop,
+        Ok(_) => Interrupt::Stop,
         // Nobody is left who could ask for it.
-        std::future::pending::<()>().await;
+        Err(_) => std::future::pending().await,
     }
 }
 

@@ -79,7 +79,7 @@ impl Signals {
 async fn obey(mut signals: Signals, sender: watch::Sender<Command>) {
     let words = [
         (
-            Command::Stop,
+            Command::Finish,
             "stopping after this reading; again for an emergency stop",
         ),
         (Command::Estop, "emergency stop"),

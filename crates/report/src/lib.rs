@@ -29,4 +29,4 @@ pub use picture::Picture;
 pub use preview::sphere;
 pub use readings::write_readings;
 pub use report::{Report, reconstruct, write};
-pub use run::{Given, Readings, Run, Seconds, State};
+pub use run::{Given, Readings, Run, Seconds, State, flag_name};

@@ -147,6 +147,12 @@ impl Run {
                     clock = reading.device_ticks;
                 }
                 Record::Extension(extension) => run.readings.planned += extension.steps.len(),
+                Record::Repeat { reading, .. } => {
+                    run.retries += u64::from(reading.retries);
+                    run.seconds
+                        .add(reading.sweep.to_string(), clock, reading.device_ticks);
+                    clock = reading.device_ticks;
+                }
                 Record::End {
                     outcome,
                     device_ticks,
@@ -214,7 +220,7 @@ impl Run {
 }
 
 /// A flag as files name it.
-pub(crate) fn flag_name(flag: Flag) -> &'static str {
+pub fn flag_name(flag: Flag) -> &'static str {
     match flag {
         Flag::Saturated => "saturated",
         Flag::Dim => "dim",

@@ -1,6 +1,7 @@
 use std::time::Duration;
 
 use arms::Arm;
+use tokio::sync::watch;
 
 use crate::{Detector, Rig, RigFile, Snapshot};
 
@@ -15,6 +16,9 @@ pub use error::DriveError;
 /// Longest wait between two looks at a rig that is engaged or lit: soon enough to stop the other arm when one fails.
 const LOOK: Duration = Duration::from_millis(200);
 
+/// Time between two looks at arms that are to come to rest.
+const REST: Duration = Duration::from_millis(20);
+
 /// A rig with what must never differ between rigs: limits, settling, approach, retries and timeouts.
 ///
 /// Nothing moves or lights up until it is told to, and nothing is stopped on drop: whoever drives calls
@@ -28,6 +32,7 @@ pub struct Drive<R: Rig> {
     waited: Duration,
     engaged: bool,
     lamp: bool,
+    seen: watch::Sender<Option<Snapshot>>,
 }
 
 impl<R: Rig> Drive<R> {
@@ -40,6 +45,7 @@ impl<R: Rig> Drive<R> {
             waited: Duration::ZERO,
             engaged: false,
             lamp: false,
+            seen: watch::Sender::new(None),
         }
     }
 
@@ -66,6 +72,7 @@ impl<R: Rig> Drive<R> {
         let snapshot = self
             .retry("read the rig's state", |rig| Box::pin(rig.snapshot()))
             .await?;
+        self.seen.send_replace(Some(snapshot));
         if self.engaged {
             for arm in Arm::BOTH {
                 let location = snapshot.arms[arm as usize];
@@ -79,6 +86,38 @@ impl<R: Rig> Drive<R> {
             }
         }
         Ok(snapshot)
+    }
+
+    /// Follows what every snapshot saw.
+    pub fn watch(&self) -> watch::Receiver<Option<Snapshot>> {
+        self.seen.subscribe()
+    }
+
+    /// Waits until both arms stand still, as those do not that a program set off which was killed.
+    ///
+    /// # Errors
+    /// A silent device; an arm that still moves after the time in which it could have crossed all its range.
+    pub async fn rest(&mut self) -> Result<(), DriveError<R::Error>> {
+        let begun = self.waited;
+        loop {
+            let snapshot = self.snapshot().await?;
+            let moving = Arm::BOTH.into_iter().find(|&arm| snapshot.arms[arm as usize].moving);
+            let Some(arm) = moving else { return Ok(()) };
+            let limits = self.file.envelope.limits(arm);
+            let longest = self.file.arm(arm).profile.duration_s(limits.max - limits.min);
+            let after = self.waited - begun;
+            if after > Duration::from_secs_f64(longest) + self.file.motion.timeout {
+                let location = snapshot.arms[arm as usize];
+                return Err(DriveError::NotArrived {
+                    arm,
+                    goal: location.goal,
+                    measured: location.measured,
+                    tolerance_rad: self.file.motion.tolerance_rad,
+                    after,
+                });
+            }
+            self.wait(REST).await?;
+        }
     }
 
     /// Lets time pass. While arms are engaged or the lamp is on, it looks at the rig every now and then, which also

@@ -2,11 +2,14 @@ use rig::{DriveError, Rig};
 use sweep::SweepError;
 
 use super::{Execution, now};
-use crate::{CaptureError, JournalError, Outcome, Record};
+use crate::{CaptureError, Event, JournalError, Outcome, Record};
 
 /// Why an execution ends before its last step.
 #[derive(Debug)]
 pub(crate) enum Interrupt<E: rig::Fault> {
+    /// At the end of a reading, the arms at rest.
+    Finish,
+    /// Anywhere, arms decelerating on their profiles.
     Stop,
     Estop,
     Fault(DriveError<E>),
@@ -32,7 +35,14 @@ impl<R: Rig> Execution<'_, R> {
         mut self,
         result: Result<(), Interrupt<R::Error>>,
     ) -> Result<Outcome, CaptureError> {
-        let at_rest = matches!(result, Ok(()) | Err(Interrupt::Stop));
+        if let Err(Interrupt::Fault(fault)) = &result {
+            self.emit(Event::Fault {
+                kind: fault.kind(),
+                device: fault.device(),
+                fault: chain(fault),
+            });
+        }
+        let at_rest = matches!(result, Ok(()) | Err(Interrupt::Finish));
         let unsafe_left = match result {
             _ if !self.touched => Vec::new(),
             _ if at_rest => self.drive.disengage_all().await,
@@ -48,7 +58,7 @@ impl<R: Rig> Execution<'_, R> {
         }
         let mut outcome = match result {
             Ok(()) => Outcome::Done,
-            Err(Interrupt::Stop) => Outcome::Stopped,
+            Err(Interrupt::Finish | Interrupt::Stop) => Outcome::Stopped,
             Err(Interrupt::Estop) => Outcome::Failed {
                 fault: "emergency stop".to_owned(),
             },
@@ -56,7 +66,9 @@ impl<R: Rig> Execution<'_, R> {
             Err(Interrupt::Way(error)) => Outcome::Failed { fault: chain(&error) },
             Err(Interrupt::Refused(error)) => return Err(error),
         };
-        if let (true, Some(error)) = (at_rest, unsafe_left.first()) {
+        // A fault or an emergency stop is worse news than what went wrong after it.
+        let stopping = matches!(outcome, Outcome::Done | Outcome::Stopped);
+        if let (true, Some(error)) = (stopping, unsafe_left.first()) {
             outcome = Outcome::Failed {
                 fault: format!("could not shut down: {}", chain(error)),
             };
@@ -66,11 +78,12 @@ impl<R: Rig> Execution<'_, R> {
             false => None,
         };
         let device_ticks = device_ticks.map(|ticks| self.clock.unwrap(ticks));
-        self.journal.append(&Record::End {
+        let end = Record::End {
             outcome: outcome.clone(),
             device_ticks,
             at: now(),
-        })?;
+        };
+        self.journal.append(&end).await?;
         Ok(outcome)
     }
 

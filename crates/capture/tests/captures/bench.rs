@@ -62,8 +62,9 @@ impl MemoryJournal {
     }
 }
 
+#[async_trait::async_trait]
 impl Journal for MemoryJournal {
-    fn append(&mut self, record: &Record) -> Result<(), JournalError> {
+    async fn append(&mut self, record: &Record) -> Result<(), JournalError> {
         (self.at_append)(record)?;
         self.records.push(record.clone());
         Ok(())

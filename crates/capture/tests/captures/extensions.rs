@@ -30,7 +30,7 @@ async fn run(scene: &mut Scene, asked: &AtomicUsize, stop_in_repeats: bool) -> O
     sender.send_replace(Command::Run);
     let mut on_event = |event| match event {
         Event::Reading { reading } if stop_in_repeats && reading.sweep == Sweep::Repeat => {
-            sender.send_replace(Command::Stop);
+            sender.send_replace(Command::Finish);
         }
         _ => {}
     };

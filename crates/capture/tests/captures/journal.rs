@@ -77,10 +77,15 @@ fn records() -> Vec<Record> {
     ]
 }
 
+fn append(journal: &mut FileJournal, record: &Record) {
+    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+    runtime.block_on(journal.append(record)).expect("room on the disk");
+}
+
 fn write(path: &Path) -> Vec<Record> {
     let mut journal = FileJournal::create(path, header()).expect("a new file");
     for record in records() {
-        journal.append(&record).expect("room on the disk");
+        append(&mut journal, &record);
     }
     journal.records().to_vec()
 }
@@ -144,7 +149,7 @@ fn a_tail_torn_at_any_byte_costs_the_last_record_alone() {
         );
         let mut journal = FileJournal::open(&path).unwrap();
         assert_eq!(journal.records(), &written[..4], "opened, cut at byte {end}");
-        journal.append(&written[4]).unwrap();
+        append(&mut journal, &written[4]);
         drop(journal);
         assert_eq!(std::fs::read(&path).unwrap(), whole, "mended, cut at byte {end}");
     }

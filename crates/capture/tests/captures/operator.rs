@@ -47,7 +47,7 @@ async fn stopped_anywhere_and_resumed_gives_the_readings_of_an_undisturbed_run()
     let whole = essence(&undisturbed.journal);
     for at in 1..whole.len() {
         let mut scene = Scene::new(SHORT, sim).await;
-        let stop = after(at, &scene.control, Command::Stop);
+        let stop = after(at, &scene.control, Command::Finish);
         let outcome = scene.run(stop).await.unwrap();
         scene.assert_safe();
         if outcome == Outcome::Done {
@@ -81,7 +81,7 @@ async fn stopped_anywhere_and_resumed_gives_the_readings_of_an_undisturbed_run()
 #[tokio::test(start_paused = true)]
 async fn a_run_is_resumed_from_wherever_the_arms_are_then() {
     let mut scene = Scene::new(SHORT, "").await;
-    let stop = after(30, &scene.control, Command::Stop);
+    let stop = after(30, &scene.control, Command::Finish);
     assert_eq!(scene.run(stop).await.unwrap(), Outcome::Stopped);
     scene.drive.engage_all().await.unwrap();
     scene
@@ -108,7 +108,7 @@ async fn a_finished_run_has_nothing_left_to_measure() {
 #[tokio::test(start_paused = true)]
 async fn other_devices_do_not_go_on_with_a_run() {
     let mut scene = Scene::new(SHORT, "").await;
-    let stop = after(30, &scene.control, Command::Stop);
+    let stop = after(30, &scene.control, Command::Finish);
     scene.run(stop).await.unwrap();
     for record in &mut scene.journal.records {
         if let Record::Begin { identities, .. } = record {
@@ -191,7 +191,7 @@ async fn a_paused_run_can_be_stopped() {
     let mut pause = after(35, &scene.control, Command::Pause);
     let outcome = scene.run(|event| {
         if event == (Event::State { state: State::Paused }) {
-            control.send_replace(Command::Stop);
+            control.send_replace(Command::Finish);
         }
         pause(event);
     });
@@ -209,7 +209,7 @@ async fn a_stop_during_warm_up_does_not_wait_for_its_end() {
                 state: State::WarmingUp,
             })
         {
-            control.send_replace(Command::Stop);
+            control.send_replace(Command::Finish);
         }
     });
     assert_eq!(outcome.await.unwrap(), Outcome::Stopped);

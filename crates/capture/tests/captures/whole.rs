@@ -242,6 +242,8 @@ async fn events_tell_the_story_in_order() {
                 Event::State { state } => format!("{state:?}"),
                 Event::Step { .. } => "step".to_owned(),
                 Event::Reading { .. } => "reading".to_owned(),
+                Event::Repeat { .. } => "repeat".to_owned(),
+                Event::Fault { .. } => "fault".to_owned(),
                 Event::Progress { .. } => "progress".to_owned(),
             });
         })
