@@ -52,6 +52,24 @@ pub enum DaemonError {
     /// The devices are not all there, or not what the rig file says; nothing moved.
     #[error("the rig is not ready")]
     NotReady(#[source] Box<rig::DriveError<rig::RigError>>),
+    /// The store cannot be opened, read or written.
+    #[error(transparent)]
+    Store(#[from] crate::StoreError),
+    /// Another daemon uses the data folder.
+    #[error("the data folder {} is in use by another goniod", .path.display())]
+    InUse {
+        /// Which.
+        path: PathBuf,
+    },
+    /// The rig file has changed since the run began in more than its port.
+    #[error("the rig file is not the one with which run {run} began: only [bus] and [sim] may differ")]
+    OtherRig {
+        /// Which run.
+        run: String,
+    },
+    /// A thread cannot be started.
+    #[error("cannot start a thread for the rig")]
+    Thread(#[source] io::Error),
     /// The journal cannot be opened, or not written any more.
     #[error(transparent)]
     Journal(#[from] capture::JournalError),
@@ -86,7 +104,7 @@ impl DaemonError {
     }
 
     /// Whether the medium is full: what was measured is safe and the run can be resumed.
-    fn disk_full(&self) -> bool {
+    pub(crate) fn disk_full(&self) -> bool {
         let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(self);
         while let Some(error) = cause {
             if error.downcast_ref::<io::Error>().is_some_and(report::is_full) {

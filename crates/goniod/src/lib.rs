@@ -1,15 +1,37 @@
-//! The capture daemon as a library: an order (job and rig file) goes in, a captured and reported run comes out.
+//! The capture daemon as a library: a queue of jobs that loses nothing, and the rig that works it off.
 //!
-//! It opens the rig, real or simulated, plans from where the arms stand, captures into a run directory of its own and
-//! has everything else derived from the journal. Front ends send commands and watch events; none of them drives.
+//! [`Daemon`] is the service: it keeps jobs, runs and readings in a [`Store`], carries one job after the other
+//! through, and obeys an operator at once. [`run`] carries out a single order without it. Front ends send commands
+//! and watch events; none of them drives.
 
+mod daemon;
 mod error;
+mod event;
+mod hand;
+mod job;
+mod lock;
 mod order;
+mod queue;
+mod refusal;
 mod run;
+mod shared;
+mod state;
 mod station;
 mod status;
+mod store;
+mod view;
 
+pub use daemon::{Daemon, Settings};
 pub use error::DaemonError;
+pub use event::{Event, Events, What};
+pub use job::{Action, Caller, Job, JobId, Submission};
 pub use order::Order;
+pub use refusal::{Refusal, RefusalKind};
 pub use run::{Ended, resume, run};
+pub use state::JobState;
 pub use status::Status;
+pub use store::{Sqlite, Store, StoreError};
+pub use view::{
+    Activity, ArmView, FaultCode, FaultView, LeftOutView, PlanView, Progress, ReadingView, RigView, RunView,
+    SweepView,
+};

@@ -52,7 +52,7 @@ impl Order {
         Self::parse(job, "the run's job file", rig, Path::new("the run's rig file"))
     }
 
-    fn parse(
+    pub(crate) fn parse(
         job_text: String,
         job_name: &str,
         rig_text: String,

@@ -49,7 +49,7 @@ pub async fn run(
     // A job that this rig can never do need not wait for the rig to answer.
     order.plan(None)?;
     prepare(out)?;
-    let mut station = Station::open(order)?;
+    let mut station = Station::open(&order.rig, &order.rig_name)?;
     let start = station.start().await?;
     let plan = order.plan(Some(start))?;
     let now = SystemTime::now();
@@ -92,7 +92,7 @@ pub async fn resume(
         });
     }
     let order = Order::resumed(header)?;
-    let mut station = Station::open(&order)?;
+    let mut station = Station::open(&order.rig, &order.rig_name)?;
     finish(directory, &mut station, &mut journal, control, on_event).await
 }
 
@@ -113,7 +113,7 @@ async fn finish(
 }
 
 /// Makes the directory of the run directories and tries whether it can be written.
-fn prepare(out: &Path) -> Result<(), DaemonError> {
+pub(crate) fn prepare(out: &Path) -> Result<(), DaemonError> {
     fs::create_dir_all(out).map_err(unwritable(out))?;
     let probe = out.join(format!(".writable-{}", std::process::id()));
     let tried = fs::File::create(&probe).and_then(|mut file| file.write_all(b"1"));
@@ -129,7 +129,7 @@ fn unwritable(path: &Path) -> impl Fn(std::io::Error) -> DaemonError {
 }
 
 /// Name of a run directory: when it began, so that a listing is in order, and its id.
-fn name(began: SystemTime, id: &ulid::Ulid) -> String {
+pub(crate) fn name(began: SystemTime, id: &ulid::Ulid) -> String {
     let time = humantime::format_rfc3339_seconds(began).to_string();
     let time = time.replace([':', '-'], "").replace('T', "-");
     format!("{}-{id}", time.trim_end_matches('Z'))

@@ -3,9 +3,9 @@ use std::path::PathBuf;
 use arms::Pose;
 use firmware_sim::Server;
 use rig::dynamixel::Dynamixel;
-use rig::{Drive, Port};
+use rig::{Drive, Port, RigFile};
 
-use crate::{DaemonError, Order};
+use crate::DaemonError;
 
 /// An opened rig, real or simulated.
 pub(crate) struct Station {
@@ -15,25 +15,25 @@ pub(crate) struct Station {
 }
 
 impl Station {
-    /// Opens and locks the port of an order's rig file, or starts the built-in simulator and opens that like any
+    /// Opens and locks the port of a rig file, or starts the built-in simulator and opens that like any
     /// port. Sends nothing.
     ///
     /// # Errors
     /// A `[sim]` table or a specimen that is not allowed; a port that is missing, in use or not permitted.
-    pub(crate) fn open(order: &Order) -> Result<Self, DaemonError> {
-        let (port, simulator) = match &order.rig.bus.port {
+    pub(crate) fn open(file: &RigFile, name: &str) -> Result<Self, DaemonError> {
+        let (port, simulator) = match &file.bus.port {
             Port::Path(path) => (path.clone(), None),
-            Port::Sim => simulate(order).map_err(|source| DaemonError::Sim {
-                file: order.rig_name.clone(),
+            Port::Sim => simulate(file).map_err(|source| DaemonError::Sim {
+                file: name.to_owned(),
                 source,
             })?,
         };
-        let rig = Dynamixel::open(&port, &order.rig).map_err(|source| DaemonError::Port {
-            file: order.rig_name.clone(),
+        let rig = Dynamixel::open(&port, file).map_err(|source| DaemonError::Port {
+            file: name.to_owned(),
             source: Box::new(source),
         })?;
         Ok(Self {
-            drive: Drive::new(rig, order.rig.clone()),
+            drive: Drive::new(rig, file.clone()),
             _simulator: simulator,
         })
     }
@@ -50,7 +50,7 @@ impl Station {
     }
 }
 
-fn simulate(order: &Order) -> Result<(PathBuf, Option<Server>), firmware_sim::SimError> {
-    let server = Server::start(&order.rig)?;
+fn simulate(file: &RigFile) -> Result<(PathBuf, Option<Server>), firmware_sim::SimError> {
+    let server = Server::start(file)?;
     Ok((server.path().to_owned(), Some(server)))
 }

@@ -101,7 +101,9 @@ impl<R: Rig> Drive<R> {
         let begun = self.waited;
         loop {
             let snapshot = self.snapshot().await?;
-            let moving = Arm::BOTH.into_iter().find(|&arm| snapshot.arms[arm as usize].moving);
+            let moving = Arm::BOTH
+                .into_iter()
+                .find(|&arm| snapshot.arms[arm as usize].moving);
             let Some(arm) = moving else { return Ok(()) };
             let limits = self.file.envelope.limits(arm);
             let longest = self.file.arm(arm).profile.duration_s(limits.max - limits.min);

@@ -20,6 +20,8 @@ struct RawJob {
     #[serde(default)]
     specimen: String,
     #[serde(default)]
+    on_stage: bool,
+    #[serde(default)]
     plane: Vec<RawPlane>,
     arc: Option<RawArc>,
     #[serde(default)]
@@ -155,6 +157,7 @@ impl Job {
         Ok(Self {
             name: name.to_owned(),
             specimen: raw.specimen,
+            on_stage: raw.on_stage,
             planes: planes.collect::<Result<_, _>>()?,
             arc: arc.transpose()?,
             model: raw.reconstruction.model,

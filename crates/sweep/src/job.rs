@@ -8,6 +8,8 @@ pub struct Job {
     pub name: String,
     /// What lies on the stage, in the technician's words.
     pub specimen: String,
+    /// Whether that lies on the stage already, so that nobody need be asked before it is measured.
+    pub on_stage: bool,
     /// Plane sweeps, at least one.
     pub planes: Vec<Plane>,
     /// The mirror arc.

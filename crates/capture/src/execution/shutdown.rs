@@ -1,4 +1,4 @@
-use rig::{DriveError, Rig};
+use rig::{Device, DriveError, FaultKind, Rig};
 use sweep::SweepError;
 
 use super::{Execution, now};
@@ -35,12 +35,10 @@ impl<R: Rig> Execution<'_, R> {
         mut self,
         result: Result<(), Interrupt<R::Error>>,
     ) -> Result<Outcome, CaptureError> {
-        if let Err(Interrupt::Fault(fault)) = &result {
-            self.emit(Event::Fault {
-                kind: fault.kind(),
-                device: fault.device(),
-                fault: chain(fault),
-            });
+        match &result {
+            Err(Interrupt::Fault(error)) => self.tell_fault(error.kind(), error.device(), chain(error)),
+            Err(Interrupt::Way(error)) => self.tell_fault(FaultKind::Refused, None, chain(error)),
+            _ => {}
         }
         let at_rest = matches!(result, Ok(()) | Err(Interrupt::Finish));
         let unsafe_left = match result {
@@ -69,9 +67,9 @@ impl<R: Rig> Execution<'_, R> {
         // A fault or an emergency stop is worse news than what went wrong after it.
         let stopping = matches!(outcome, Outcome::Done | Outcome::Stopped);
         if let (true, Some(error)) = (stopping, unsafe_left.first()) {
-            outcome = Outcome::Failed {
-                fault: format!("could not shut down: {}", chain(error)),
-            };
+            let fault = format!("could not shut down: {}", chain(error));
+            self.tell_fault(error.kind(), error.device(), fault.clone());
+            outcome = Outcome::Failed { fault };
         }
         let device_ticks = match self.touched && unsafe_left.is_empty() {
             true => self.drive.ticks().await.ok(),
@@ -85,6 +83,10 @@ impl<R: Rig> Execution<'_, R> {
         };
         self.journal.append(&end).await?;
         Ok(outcome)
+    }
+
+    fn tell_fault(&mut self, kind: FaultKind, device: Option<Device>, fault: String) {
+        self.emit(Event::Fault { kind, device, fault });
     }
 
     /// Makes the rig safe after a panic; the journal is left as it is.

@@ -79,7 +79,9 @@ fn records() -> Vec<Record> {
 
 fn append(journal: &mut FileJournal, record: &Record) {
     let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
-    runtime.block_on(journal.append(record)).expect("room on the disk");
+    runtime
+        .block_on(journal.append(record))
+        .expect("room on the disk");
 }
 
 fn write(path: &Path) -> Vec<Record> {

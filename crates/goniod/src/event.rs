@@ -1,0 +1,215 @@
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use serde::Serialize;
+use tokio::sync::watch;
+use utoipa::ToSchema;
+
+use crate::{Activity, FaultView, Job, Progress, ReadingView};
+
+/// Events that are kept for whoever comes back.
+const KEPT: usize = 4096;
+
+/// Something that happened, with an id that only ever grows, also across restarts.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+pub struct Event {
+    /// Its id.
+    pub id: u64,
+    /// When, RFC 3339, UTC.
+    pub at: String,
+    /// What.
+    #[serde(flatten)]
+    pub what: What,
+}
+
+/// What happened.
+#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+#[serde(rename_all = "snake_case", tag = "event")]
+pub enum What {
+    /// A job is new, or stands otherwise than before.
+    Job {
+        /// The job now.
+        job: Box<Job>,
+    },
+    /// The rig does something else.
+    Activity {
+        /// What.
+        activity: Activity,
+    },
+    /// A step of the run begins.
+    Step {
+        /// Its index in the plan.
+        step: usize,
+        /// Steps of the plan.
+        of: usize,
+        /// What it belongs to.
+        sweep: String,
+        /// Where the light arm goes, degrees.
+        light_deg: f64,
+        /// Where the sensor arm goes, degrees.
+        sensor_deg: f64,
+    },
+    /// A reading was taken and is durable.
+    Reading {
+        /// The run.
+        run: String,
+        /// The reading.
+        reading: Box<ReadingView>,
+    },
+    /// How far the run is.
+    Progress {
+        /// How far.
+        progress: Progress,
+    },
+    /// A resumed run measured a pose of its finished part again.
+    Repeat {
+        /// The step that was measured again.
+        step: usize,
+        /// By how much the brightest channel differs from before, relative to the lamp monitor.
+        difference_rel: f64,
+    },
+    /// Something to know that stops nothing.
+    Warning {
+        /// In words.
+        text: String,
+    },
+    /// A fault was latched.
+    Fault {
+        /// Which.
+        fault: FaultView,
+    },
+    /// The fault was acknowledged.
+    Acknowledged {
+        /// By whom.
+        by: String,
+    },
+    /// Events before this one are no longer known: look at everything anew.
+    Gap,
+}
+
+/// The events that are kept, shared by all who watch.
+#[derive(Debug)]
+pub(crate) struct Log {
+    kept: Mutex<VecDeque<Event>>,
+    last: watch::Sender<Last>,
+}
+
+/// How far the log is.
+#[derive(Clone, Copy, Debug)]
+struct Last {
+    id: u64,
+    /// Nothing comes any more.
+    closed: bool,
+}
+
+impl Log {
+    /// A log whose ids come after `before`.
+    pub(crate) fn new(before: u64) -> Self {
+        Self {
+            kept: Mutex::new(VecDeque::new()),
+            last: watch::Sender::new(Last {
+                id: before,
+                closed: false,
+            }),
+        }
+    }
+
+    /// Tells everyone.
+    pub(crate) fn tell(&self, at: String, what: What) {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let id = self.last.borrow().id + 1;
+        if kept.len() == KEPT {
+            kept.pop_front();
+        }
+        kept.push_back(Event { id, at, what });
+        drop(kept);
+        self.last.send_modify(|last| last.id = id);
+    }
+
+    /// Lets everyone know that nothing comes any more.
+    pub(crate) fn close(&self) {
+        self.last.send_modify(|last| last.closed = true);
+    }
+
+    /// The first event after an id; where some in between are no longer kept, a gap that stands for them.
+    fn after(&self, id: u64) -> Option<Event> {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let next = kept.partition_point(|event| event.id <= id);
+        let event = kept.get(next)?;
+        if event.id == id + 1 {
+            return Some(event.clone());
+        }
+        Some(Event {
+            id: event.id - 1,
+            at: event.at.clone(),
+            what: What::Gap,
+        })
+    }
+}
+
+/// Events as they happen. Whoever reads too slowly is told of a gap, and slows nothing down.
+#[derive(Debug)]
+pub struct Events {
+    log: Arc<Log>,
+    last: watch::Receiver<Last>,
+    /// Id of the event that was read last.
+    seen: u64,
+}
+
+impl Events {
+    /// Events after an id, or from now on.
+    pub(crate) fn new(log: Arc<Log>, after: Option<u64>) -> Self {
+        let last = log.last.subscribe();
+        let now = last.borrow().id;
+        // An id from the future was never given out by this store.
+        let seen = after.map_or(now, |after| after.min(now));
+        Self { log, last, seen }
+    }
+
+    /// The next event; `None` once the daemon has ended and all were read.
+    pub async fn next(&mut self) -> Option<Event> {
+        loop {
+            let closed = self.last.borrow_and_update().closed;
+            if let Some(event) = self.log.after(self.seen) {
+                self.seen = event.id;
+                return Some(event);
+            }
+            if closed {
+                return None;
+            }
+            self.last.changed().await.ok()?;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn warning(n: usize) -> What {
+        What::Warning { text: n.to_string() }
+    }
+
+    #[tokio::test]
+    async fn whoever_comes_back_gets_what_was_missed_or_is_told_of_a_gap() {
+        let log = Arc::new(Log::new(100));
+        let mut early = Events::new(log.clone(), None);
+        for n in 0..3 {
+            log.tell(String::new(), warning(n));
+        }
+        assert_eq!(early.next().await.map(|event| event.id), Some(101));
+        let mut back = Events::new(log.clone(), Some(102));
+        let event = back.next().await.unwrap();
+        assert_eq!((event.id, event.what), (103, warning(2)));
+        let mut old = Events::new(log.clone(), Some(7));
+        let event = old.next().await.unwrap();
+        assert_eq!((event.id, event.what), (100, What::Gap), "a life before");
+        assert_eq!(old.next().await.map(|event| event.id), Some(101));
+        for n in 0..KEPT {
+            log.tell(String::new(), warning(n));
+        }
+        let event = early.next().await.unwrap();
+        assert_eq!(event.what, What::Gap, "too slow");
+        assert_eq!(early.next().await.map(|next| next.id), Some(event.id + 1));
+    }
+}

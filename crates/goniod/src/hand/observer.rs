@@ -1,0 +1,149 @@
+use std::sync::Arc;
+
+use capture::{Event, Reading, Record, State};
+use report::Measurement;
+use rig::{Counts, Dark};
+use tokio::sync::mpsc;
+
+use crate::queue::News;
+use crate::shared::Shared;
+use crate::{Activity, FaultCode, Progress, ReadingView, What};
+
+/// A pose measured again may differ by so much before it is worth a warning: twice the lamp's drift.
+const DIFFERENCE: f64 = 0.01;
+
+/// Turns what a capture says into what the daemon shows and tells.
+pub(super) struct Observer {
+    shared: Arc<Shared>,
+    news: mpsc::UnboundedSender<News>,
+    run: String,
+    /// Dark readings so far.
+    dark: Vec<Counts>,
+    begun_ticks: u64,
+    /// The fault that ended the capture.
+    pub(super) fault: Option<FaultCode>,
+}
+
+impl Observer {
+    pub(super) fn new(
+        shared: Arc<Shared>,
+        news: mpsc::UnboundedSender<News>,
+        run: &str,
+        records: &[Record],
+    ) -> Self {
+        let mut observer = Self {
+            shared,
+            news,
+            run: run.to_owned(),
+            dark: Vec::new(),
+            begun_ticks: 0,
+            fault: None,
+        };
+        for record in records {
+            match record {
+                Record::Begin { device_ticks, .. } if observer.begun_ticks == 0 => {
+                    observer.begun_ticks = *device_ticks;
+                }
+                Record::Reading(reading) => observer.learn(reading),
+                _ => {}
+            }
+        }
+        observer
+    }
+
+    /// Shows and tells one event.
+    pub(super) fn see(&mut self, event: Event) {
+        match event {
+            Event::State { state } => self.state(state),
+            Event::Step {
+                step,
+                of,
+                sweep,
+                goal,
+            } => {
+                self.shared.tell(What::Step {
+                    step,
+                    of,
+                    sweep: sweep.to_string(),
+                    light_deg: goal.light.deg(),
+                    sensor_deg: goal.sensor.deg(),
+                });
+            }
+            Event::Reading { reading } => self.reading(&reading),
+            Event::Repeat {
+                reading,
+                difference_rel,
+            } => {
+                self.shared.tell(What::Repeat {
+                    step: reading.step,
+                    difference_rel,
+                });
+                if difference_rel.abs() > DIFFERENCE {
+                    self.shared.warn(format!(
+                        "measured again, step {} differs by {:.2} %: has the specimen, the lamp or the stage changed?",
+                        reading.step,
+                        difference_rel * 100.0
+                    ));
+                }
+            }
+            Event::Progress {
+                done,
+                of,
+                seconds_left,
+                retries,
+            } => {
+                let progress = Progress {
+                    done,
+                    of,
+                    seconds_left,
+                    retries,
+                };
+                self.shared
+                    .view
+                    .send_modify(|view| view.progress = Some(progress));
+                self.shared.tell(What::Progress { progress });
+            }
+            Event::Fault { kind, .. } => self.fault = Some(kind.into()),
+        }
+    }
+
+    fn state(&mut self, state: State) {
+        let before = self.shared.view.borrow().activity;
+        let activity = Activity::from(state);
+        self.shared.activity(activity);
+        if activity == Activity::WarmingUp {
+            self.shared.view.send_modify(|view| view.lamp = true);
+        }
+        let holding = match (before, activity) {
+            (Activity::Paused, Activity::Paused) => return,
+            (_, Activity::Paused) => true,
+            (Activity::Paused, Activity::Running) => false,
+            _ => return,
+        };
+        let _ = self.news.send(News::Holding(holding));
+    }
+
+    fn reading(&mut self, reading: &Reading) {
+        self.learn(reading);
+        let rig = &self.shared.rig;
+        let measured = Measurement::new(reading, &Dark::fit(&self.dark), rig, self.begun_ticks);
+        let nominal = rig.calibration.monitor * f64::from(reading.counts.exposure.integration_us);
+        self.shared.view.send_modify(|view| {
+            view.temperature_c = Some(reading.counts.temperature_c);
+            view.lamp = reading.lamp;
+            if reading.lamp {
+                view.lamp_monitor = Some(f64::from(reading.counts.monitor) / nominal);
+            }
+        });
+        self.shared.tell(What::Reading {
+            run: self.run.clone(),
+            reading: Box::new(ReadingView::from(&measured)),
+        });
+    }
+
+    fn learn(&mut self, reading: &Reading) {
+        if !reading.lamp {
+            self.dark.push(reading.counts);
+        }
+    }
+}

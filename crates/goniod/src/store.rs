@@ -1,0 +1,166 @@
+use std::path::PathBuf;
+
+use async_trait::async_trait;
+use capture::Record;
+
+use crate::{FaultCode, FaultView, Job, JobId, RunView};
+
+mod journal;
+mod sqlite;
+
+pub(crate) use journal::StoreJournal;
+pub use sqlite::Sqlite;
+
+/// Where everything is kept that must outlive the program: jobs, runs, their journals, faults, and who asked what.
+///
+/// What a method has returned from is durable. One daemon writes at a time.
+#[async_trait]
+pub trait Store: Send + Sync + 'static {
+    /// Counts another start of the daemon; the first is 1.
+    ///
+    /// # Errors
+    /// The medium refused.
+    async fn begin_life(&self, at: &str) -> Result<u64, StoreError>;
+
+    /// Adds a job at the end of the queue and sets its place.
+    ///
+    /// # Errors
+    /// The medium refused.
+    async fn add_job(&self, job: &mut Job) -> Result<(), StoreError>;
+
+    /// Keeps a job's state, why, run and time of change.
+    ///
+    /// # Errors
+    /// The medium refused.
+    async fn change_job(&self, job: &Job) -> Result<(), StoreError>;
+
+    /// One job.
+    ///
+    /// # Errors
+    /// The medium refused, or what it holds is not a job.
+    async fn job(&self, id: JobId) -> Result<Option<Job>, StoreError>;
+
+    /// Jobs that are not over, in the order of the queue, then the latest so many that are.
+    ///
+    /// # Errors
+    /// As [`Self::job`].
+    async fn jobs(&self, over: u32) -> Result<Vec<Job>, StoreError>;
+
+    /// Begins a run with the first record of its journal, and ties its job to it.
+    ///
+    /// # Errors
+    /// The medium refused.
+    async fn begin_run(&self, run: &RunView, header: &Record) -> Result<(), StoreError>;
+
+    /// Notes when a run's files were written.
+    ///
+    /// # Errors
+    /// The medium refused.
+    async fn reported(&self, run: &str, at: &str) -> Result<(), StoreError>;
+
+    /// The latest so many runs, newest first.
+    ///
+    /// # Errors
+    /// The medium refused, or what it holds is not a run.
+    async fn runs(&self, most: u32) -> Result<Vec<RunView>, StoreError>;
+
+    /// One run.
+    ///
+    /// # Errors
+    /// As [`Self::runs`].
+    async fn run(&self, id: &str) -> Result<Option<RunView>, StoreError>;
+
+    /// Adds a record to a run's journal at a place, from 0.
+    ///
+    /// # Errors
+    /// The medium refused; the place is taken, or the reading is there already.
+    async fn append(&self, run: &str, seq: u64, record: &Record) -> Result<(), StoreError>;
+
+    /// A run's journal, oldest record first.
+    ///
+    /// # Errors
+    /// The medium refused, or what it holds is no record.
+    async fn records(&self, run: &str) -> Result<Vec<Record>, StoreError>;
+
+    /// Latches a fault.
+    ///
+    /// # Errors
+    /// The medium refused.
+    async fn latch(&self, fault: &FaultView) -> Result<(), StoreError>;
+
+    /// The latest fault that nobody has acknowledged.
+    ///
+    /// # Errors
+    /// The medium refused, or what it holds is no fault.
+    async fn latched(&self) -> Result<Option<FaultView>, StoreError>;
+
+    /// Acknowledges all latched faults.
+    ///
+    /// # Errors
+    /// The medium refused.
+    async fn acknowledge(&self, by: &str, at: &str) -> Result<(), StoreError>;
+
+    /// Notes who asked what, and what came of it.
+    ///
+    /// # Errors
+    /// The medium refused.
+    async fn audit(&self, at: &str, who: &str, what: &str, outcome: &str) -> Result<(), StoreError>;
+
+    /// Finishes what is under way and closes.
+    async fn close(&self);
+}
+
+/// What goes wrong with the store.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum StoreError {
+    /// It cannot be opened or made.
+    #[error("cannot open the store {}", .path.display())]
+    Open {
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        source: sqlx::Error,
+    },
+    /// It was made by a newer version, or cannot be brought up to date.
+    #[error("cannot bring the store {} up to date", .path.display())]
+    Migrate {
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        source: sqlx::migrate::MigrateError,
+    },
+    /// A query failed.
+    #[error("cannot {what} in the store")]
+    Query {
+        /// What was attempted.
+        what: &'static str,
+        /// Why.
+        source: sqlx::Error,
+    },
+    /// It holds something that this version cannot read.
+    #[error("the store holds a {what} that cannot be read: {why}")]
+    Damaged {
+        /// What should be there.
+        what: &'static str,
+        /// What is wrong with it.
+        why: String,
+    },
+}
+
+impl StoreError {
+    /// The fault that it is.
+    pub(crate) fn code(&self) -> FaultCode {
+        /// SQLITE_FULL; extended codes have it in their low byte.
+        const FULL: u32 = 13;
+        let (Self::Open { source, .. } | Self::Query { source, .. }) = self else {
+            return FaultCode::Store;
+        };
+        let code = source.as_database_error().and_then(|error| error.code());
+        let code = code.and_then(|code| code.parse::<u32>().ok());
+        match code.map(|code| code & 0xFF) {
+            Some(FULL) => FaultCode::DiskFull,
+            _ => FaultCode::Store,
+        }
+    }
+}

@@ -1,0 +1,122 @@
+use goniod::{Action, JobState, RefusalKind};
+
+use crate::bench::{Bench, SHORT, idle, on_stage, operator, readings, rig, state, submission};
+
+#[tokio::test]
+async fn a_job_waits_for_its_specimen_and_leaves_a_whole_run() {
+    let bench = Bench::new("");
+    let daemon = bench.open().await;
+    let mut events = daemon.events(None);
+    let job = daemon.submit(&operator(), submission(SHORT)).await.unwrap();
+    state(&mut events, job.id, JobState::AwaitingSpecimen).await;
+    let second = daemon.submit(&operator(), submission(SHORT)).await.unwrap();
+    let refusal = daemon
+        .act(&operator(), second.id, Action::Resume)
+        .await
+        .unwrap_err();
+    assert_eq!(refusal.kind, RefusalKind::Conflict, "{refusal}");
+    daemon.act(&operator(), job.id, Action::Ready).await.unwrap();
+    let done = state(&mut events, job.id, JobState::Done).await;
+    state(&mut events, second.id, JobState::AwaitingSpecimen).await;
+    let run = daemon.run(&done.run.unwrap()).await.unwrap();
+    assert_eq!(run.accepted, run.planned);
+    for file in [
+        "journal",
+        "run.json",
+        "readings.csv",
+        "brdf.binary",
+        "report.html",
+    ] {
+        assert!(run.directory.join(file).exists(), "{file}");
+    }
+    assert_eq!(
+        daemon
+            .readings(&run.id)
+            .await
+            .unwrap()
+            .iter()
+            .filter(|r| r.accepted)
+            .count() as u64,
+        run.planned
+    );
+    daemon.act(&operator(), second.id, Action::Cancel).await.unwrap();
+    let states: Vec<_> = daemon.jobs().await.unwrap().iter().map(|job| job.state).collect();
+    assert_eq!(states, [JobState::Cancelled, JobState::Done]);
+    daemon.shutdown().await;
+    assert!(events.next().await.is_some(), "what was told is still there");
+}
+
+#[tokio::test]
+async fn jobs_whose_specimen_lies_there_follow_each_other() {
+    let bench = Bench::new("");
+    let daemon = bench.open().await;
+    let mut events = daemon.events(None);
+    let first = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    let second = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    state(&mut events, first.id, JobState::Done).await;
+    state(&mut events, second.id, JobState::Done).await;
+    assert_eq!(daemon.runs().await.unwrap().len(), 2);
+    daemon.shutdown().await;
+}
+
+#[tokio::test]
+async fn a_job_that_is_wrong_is_refused_with_its_line() {
+    let bench = Bench::new("");
+    let daemon = bench.open().await;
+    let wrong = submission("[[plane]]\ntheta_r_deg = 95\nreadings = 1\n");
+    let refusal = daemon.submit(&operator(), wrong).await.unwrap_err();
+    assert_eq!(refusal.kind, RefusalKind::Invalid);
+    assert!(
+        refusal.why.contains("line 2") && refusal.why.contains("85"),
+        "{refusal}"
+    );
+    assert!(daemon.jobs().await.unwrap().is_empty());
+    daemon.shutdown().await;
+}
+
+#[tokio::test]
+async fn a_shutdown_finishes_the_reading_and_the_run_goes_on_later() {
+    let bench = Bench::new("sim.clock = \"real\"");
+    let daemon = bench.open().await;
+    let mut events = daemon.events(None);
+    let job = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    readings(&mut events, 3).await;
+    daemon.shutdown().await;
+    let taken = {
+        let daemon = bench.open().await;
+        let again = daemon.job(job.id).await.unwrap();
+        assert_eq!(again.state, JobState::Interrupted, "{again:?}");
+        let view = rig(&daemon, |rig| rig.connected).await;
+        assert!(!view.lamp && view.job.is_none());
+        let taken = daemon.run(again.run.as_deref().unwrap()).await.unwrap().accepted;
+        daemon.shutdown().await;
+        taken
+    };
+    assert!(taken >= 3);
+    // The rest in simulated time.
+    let bench = Bench {
+        rig: String::new(),
+        ..bench
+    };
+    let daemon = bench.open().await;
+    let mut events = daemon.events(None);
+    daemon.act(&operator(), job.id, Action::Resume).await.unwrap();
+    let done = state(&mut events, job.id, JobState::Done).await;
+    let run = daemon.run(&done.run.unwrap()).await.unwrap();
+    assert_eq!(run.accepted, run.planned);
+    idle(&daemon).await;
+    daemon.shutdown().await;
+}
+
+#[tokio::test]
+async fn a_data_folder_has_one_daemon() {
+    let bench = Bench::new("");
+    let daemon = bench.open().await;
+    let error = goniod::Daemon::open(bench.settings())
+        .await
+        .err()
+        .expect("refused");
+    assert!(error.to_string().contains("in use by another goniod"), "{error}");
+    daemon.shutdown().await;
+    bench.open().await.shutdown().await;
+}
