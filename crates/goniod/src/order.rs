@@ -1,9 +1,11 @@
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 use arms::Pose;
 use capture::Header;
 use rig::RigFile;
 use sweep::{Job, Plan};
+use ulid::Ulid;
 
 use crate::DaemonError;
 
@@ -65,6 +67,19 @@ impl Order {
             rig_text,
             rig_name: rig_name.display().to_string(),
         })
+    }
+
+    /// First record of the journal of a run that begins now.
+    pub(crate) fn header(&self, plan: Plan, run: &Ulid, now: SystemTime) -> Header {
+        Header {
+            run: run.to_string(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            job: self.job_text.clone(),
+            rig: self.rig_text.clone(),
+            plan,
+            started: humantime::format_rfc3339_seconds(now).to_string(),
+            certificate: None,
+        }
     }
 
     /// What the order becomes on its rig, with the arms standing at `start`.

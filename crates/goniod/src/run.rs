@@ -3,7 +3,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use capture::{Command, Event, FileJournal, Header, Journal, Outcome, Record};
+use capture::{Command, Event, FileJournal, Journal, Outcome, Record};
 use report::{Report, RunDirectory};
 use tokio::sync::watch;
 
@@ -56,15 +56,7 @@ pub async fn run(
     let id = ulid::Ulid::generate();
     let directory = RunDirectory::at(out.join(name(now, &id)));
     fs::create_dir(directory.path()).map_err(unwritable(out))?;
-    let header = Header {
-        run: id.to_string(),
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        job: order.job_text.clone(),
-        rig: order.rig_text.clone(),
-        plan,
-        started: humantime::format_rfc3339_seconds(now).to_string(),
-        certificate: None,
-    };
+    let header = order.header(plan, &id, now);
     let mut journal = FileJournal::create(directory.journal(), header)?;
     finish(directory, &mut station, &mut journal, control, on_event).await
 }

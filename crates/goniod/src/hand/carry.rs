@@ -86,14 +86,7 @@ impl Hand {
             planned: plan.steps.len() as u64,
             accepted: 0,
         };
-        let header = Header {
-            run: run.id.clone(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            job: order.job_text,
-            rig: order.rig_text,
-            plan,
-            started: run.started.clone(),
-        };
+        let header = order.header(plan, &id, now);
         self.shared.store.begin_run(&run, &Record::Header(header)).await?;
         self.say(News::Begun { run: run.id.clone() });
         Ok(run.id)

@@ -1,8 +1,7 @@
 use std::sync::Arc;
 
 use capture::{Event, Reading, Record, State};
-use report::Measurement;
-use rig::{Counts, Dark};
+use sweep::Sweep;
 use tokio::sync::mpsc;
 
 use crate::queue::News;
@@ -17,9 +16,8 @@ pub(super) struct Observer {
     shared: Arc<Shared>,
     news: mpsc::UnboundedSender<News>,
     run: String,
-    /// Dark readings so far.
-    dark: Vec<Counts>,
-    begun_ticks: u64,
+    /// What the reflectance of a reading rests on: header, first beginning, readings in the dark and of a reference.
+    basis: Vec<Record>,
     /// The fault that ended the capture.
     pub(super) fault: Option<FaultCode>,
 }
@@ -35,19 +33,10 @@ impl Observer {
             shared,
             news,
             run: run.to_owned(),
-            dark: Vec::new(),
-            begun_ticks: 0,
+            basis: Vec::new(),
             fault: None,
         };
-        for record in records {
-            match record {
-                Record::Begin { device_ticks, .. } if observer.begun_ticks == 0 => {
-                    observer.begun_ticks = *device_ticks;
-                }
-                Record::Reading(reading) => observer.learn(reading),
-                _ => {}
-            }
-        }
+        records.iter().for_each(|record| observer.learn(record));
         observer
     }
 
@@ -124,10 +113,23 @@ impl Observer {
     }
 
     fn reading(&mut self, reading: &Reading) {
-        self.learn(reading);
-        let rig = &self.shared.rig;
-        let measured = Measurement::new(reading, &Dark::fit(&self.dark), rig, self.begun_ticks);
-        let nominal = rig.calibration.monitor * f64::from(reading.counts.exposure.integration_us);
+        let record = Record::Reading(reading.clone());
+        if !self
+            .basis
+            .iter()
+            .any(|record| matches!(record, Record::Begin { .. }))
+        {
+            self.basis.push(Record::Begin {
+                identities: Vec::new(),
+                device_ticks: reading.device_ticks,
+                at: String::new(),
+            });
+        }
+        self.basis.push(record.clone());
+        let measured = report::measurements(&self.basis, &self.shared.rig).pop();
+        self.basis.pop();
+        self.learn(&record);
+        let nominal = self.shared.rig.calibration.monitor * f64::from(reading.counts.exposure.integration_us);
         self.shared.view.send_modify(|view| {
             view.temperature_c = Some(reading.counts.temperature_c);
             view.lamp = reading.lamp;
@@ -135,15 +137,23 @@ impl Observer {
                 view.lamp_monitor = Some(f64::from(reading.counts.monitor) / nominal);
             }
         });
-        self.shared.tell(What::Reading {
-            run: self.run.clone(),
-            reading: Box::new(ReadingView::from(&measured)),
-        });
+        if let Some(measured) = measured {
+            self.shared.tell(What::Reading {
+                run: self.run.clone(),
+                reading: Box::new(ReadingView::from(&measured)),
+            });
+        }
     }
 
-    fn learn(&mut self, reading: &Reading) {
-        if !reading.lamp {
-            self.dark.push(reading.counts);
+    fn learn(&mut self, record: &Record) {
+        let rests_on = match record {
+            Record::Header(_) => true,
+            Record::Begin { .. } => self.basis.len() < 2,
+            Record::Reading(reading) => !reading.lamp || reading.sweep == Sweep::Reference,
+            _ => false,
+        };
+        if rests_on {
+            self.basis.push(record.clone());
         }
     }
 }
