@@ -54,6 +54,7 @@ prop_compose! {
         Job {
             name: "job.toml".to_owned(),
             specimen: String::new(),
+            on_stage: false,
             planes,
             arc: arc.map(|(readings, offset)| Arc { readings, offset: if mirror { 0.0 } else { offset } }),
             model: Model::Separable,
