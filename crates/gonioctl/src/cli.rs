@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use clap_complete::Shell;
 
 /// Measures how a flat specimen reflects light, with two servo arms and a photometer.
 ///
@@ -18,6 +19,16 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// List the serial ports that a rig may be on.
     Ports {
+        #[command(flatten)]
+        output: Output,
+    },
+    /// Say what is wrong with the rig and what to do about it. Moves nothing; switches the lamp on for a moment.
+    Doctor {
+        #[command(flatten)]
+        rig: RigArgument,
+        /// Where run directories are to go; its disk is looked at.
+        #[arg(long, value_name = "DIR", default_value = "runs")]
+        out: PathBuf,
         #[command(flatten)]
         output: Output,
     },
@@ -83,6 +94,17 @@ pub(crate) enum Command {
         /// Where to write study.csv and summary.json; rows go to stdout unless given.
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
+    },
+    /// Print the script with which a shell completes these commands.
+    Completions {
+        /// The shell.
+        shell: Shell,
+    },
+    /// Write the manual pages, one for each command.
+    Man {
+        /// Where to; made where there is none.
+        #[arg(value_name = "DIR")]
+        directory: PathBuf,
     },
 }
 

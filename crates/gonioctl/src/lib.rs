@@ -3,15 +3,18 @@
 //! Data goes to stdout, talk to stderr; the exit code says how it ended.
 
 mod cli;
+mod doctor;
 mod eval;
 mod exit;
 mod export;
+mod manual;
 mod plan;
 mod ports;
 mod print;
 mod progress;
 mod reconstruct;
 mod run;
+mod signals;
 mod study;
 
 use std::process::ExitCode;
@@ -40,6 +43,7 @@ pub fn main() -> ExitCode {
 fn command(command: Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Ports { output } => ports::ports(output.json)?,
+        Command::Doctor { rig, out, output } => return doctor::doctor(rig.rig.as_deref(), &out, output.json),
         Command::Plan { job, rig, output } => plan::plan(&job, rig.rig.as_deref(), output.json)?,
         Command::Run {
             job,
@@ -72,6 +76,8 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             output,
         } => eval::eval(&truth, &estimate, output.json)?,
         Command::Study { study, quick, out } => study::study(study.as_deref(), quick, out.as_deref())?,
+        Command::Completions { shell } => manual::completions(shell)?,
+        Command::Man { directory } => manual::man(&directory)?,
         Command::Reconstruct { run, output } => reconstruct::reconstruct(run, output.json)?,
     }
     Ok(ExitCode::SUCCESS)

@@ -5,10 +5,10 @@ use std::time::Instant;
 use capture::{Command, Event, Outcome};
 use goniod::{DaemonError, Ended, Order};
 use serde_json::json;
-use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::sync::watch;
 
 use crate::progress::{Progress, clock};
+use crate::signals::Signals;
 use crate::{eval, exit, print};
 
 /// What `run` is to do.
@@ -48,31 +48,6 @@ pub(crate) fn run(task: &Task<'_>, json: bool) -> anyhow::Result<ExitCode> {
         print::line(ended.directory.path().display())?;
     }
     Ok(exit::code(ended.status()))
-}
-
-/// What asks for an end: Ctrl-C, `kill`, and a terminal that was closed.
-struct Signals {
-    interrupt: Signal,
-    terminate: Signal,
-    hang_up: Signal,
-}
-
-impl Signals {
-    fn listen() -> std::io::Result<Self> {
-        Ok(Self {
-            interrupt: signal(SignalKind::interrupt())?,
-            terminate: signal(SignalKind::terminate())?,
-            hang_up: signal(SignalKind::hangup())?,
-        })
-    }
-
-    async fn next(&mut self) {
-        tokio::select! {
-            _ = self.interrupt.recv() => {}
-            _ = self.terminate.recv() => {}
-            _ = self.hang_up.recv() => {}
-        }
-    }
 }
 
 /// The first signal finishes the reading and holds, the second stops at once.

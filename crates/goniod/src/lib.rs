@@ -25,7 +25,7 @@ pub use daemon::{Daemon, Settings};
 pub use error::DaemonError;
 pub use event::{Event, Events, What};
 pub use job::{Action, Caller, Job, JobId, Submission};
-pub use order::Order;
+pub use order::{Order, rig_text};
 pub use refusal::{Refusal, RefusalKind};
 pub use run::{Ended, resume, run};
 pub use state::JobState;

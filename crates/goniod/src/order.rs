@@ -35,13 +35,7 @@ impl Order {
     /// A file that cannot be read, or what is wrong in it with its place.
     pub fn read(job: &Path, rig: Option<&Path>) -> Result<Self, DaemonError> {
         let job_text = read("job file", job)?;
-        let (rig_text, rig_name) = match rig {
-            Some(path) => (read("rig file", path)?, path.to_owned()),
-            None if Path::new(RIG_HERE).exists() => {
-                (read("rig file", Path::new(RIG_HERE))?, PathBuf::from(RIG_HERE))
-            }
-            None => (RigFile::BUILT_IN.to_owned(), PathBuf::from("built-in rig file")),
-        };
+        let (rig_text, rig_name) = rig_text(rig)?;
         Self::parse(job_text, &job.to_string_lossy(), rig_text, &rig_name)
     }
 
@@ -88,6 +82,21 @@ impl Order {
     /// What of the job this rig cannot do, or that the arms stand where no motion may begin.
     pub fn plan(&self, start: Option<Pose>) -> Result<Plan, DaemonError> {
         Ok(sweep::plan(&self.job, &capture::mechanics(&self.rig, start))?)
+    }
+}
+
+/// Text of a rig file and what messages call it: the file named, else config/rig.toml in the working directory if there
+/// is one, else the built-in one.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn rig_text(rig: Option<&Path>) -> Result<(String, PathBuf), DaemonError> {
+    match rig {
+        Some(path) => Ok((read("rig file", path)?, path.to_owned())),
+        None if Path::new(RIG_HERE).exists() => {
+            Ok((read("rig file", Path::new(RIG_HERE))?, PathBuf::from(RIG_HERE)))
+        }
+        None => Ok((RigFile::BUILT_IN.to_owned(), PathBuf::from("built-in rig file"))),
     }
 }
 

@@ -4,6 +4,7 @@
 
 mod block;
 mod bus;
+mod census;
 mod line;
 mod node;
 mod photometer;
@@ -12,6 +13,7 @@ pub mod register;
 mod rig;
 mod servo;
 
+pub use census::{Census, Heard};
 pub use photometer::Photometer;
 pub use port::{Adapter, Usb, ports};
 pub use register::{BAUD_RATES, MODELS, PHOTOMETER_MODEL};

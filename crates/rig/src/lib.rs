@@ -7,6 +7,7 @@ mod actuator;
 mod axis;
 mod calibration;
 mod detector;
+pub mod doctor;
 mod drive;
 pub mod dynamixel;
 mod error;

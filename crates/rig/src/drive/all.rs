@@ -19,22 +19,37 @@ impl<R: Rig> Drive<R> {
     /// # Errors
     /// The first device that is silent, ill or different.
     pub async fn identify_all(&mut self) -> Result<[Identity; 3], DriveError<R::Error>> {
-        let light = self
-            .retry("identify the light servo", |rig| {
-                Box::pin(rig.axis(Arm::Light).identify())
-            })
-            .await?;
-        let sensor = self
-            .retry("identify the sensor servo", |rig| {
-                Box::pin(rig.axis(Arm::Sensor).identify())
-            })
-            .await?;
-        let photometer = self
-            .retry("identify the photometer", |rig| {
-                Box::pin(rig.photometer().identify())
-            })
-            .await?;
+        let light = self.identify(Device::Light).await?;
+        let sensor = self.identify(Device::Sensor).await?;
+        let photometer = self.identify(Device::Photometer).await?;
         Ok([light, sensor, photometer])
+    }
+
+    /// Reads who one device is and whether it is as the rig file says. Moves and switches nothing.
+    ///
+    /// # Errors
+    /// It is silent, ill or different.
+    pub async fn identify(&mut self, device: Device) -> Result<Identity, DriveError<R::Error>> {
+        match device {
+            Device::Light => {
+                self.retry("identify the light servo", |rig| {
+                    Box::pin(rig.axis(Arm::Light).identify())
+                })
+                .await
+            }
+            Device::Sensor => {
+                self.retry("identify the sensor servo", |rig| {
+                    Box::pin(rig.axis(Arm::Sensor).identify())
+                })
+                .await
+            }
+            Device::Photometer => {
+                self.retry("identify the photometer", |rig| {
+                    Box::pin(rig.photometer().identify())
+                })
+                .await
+            }
+        }
     }
 
     /// Makes both arms ready to move, without moving them.

@@ -57,24 +57,30 @@ impl<R: Rig> Drive<R> {
         })
     }
 
-    /// Checks a motion from where the arms are. They may stand off their goals by the tolerance, so the way is
-    /// checked against an envelope that is wider by as much; its end is not.
+    /// Checks a motion from where the arms are: the way against the tolerant envelope, its end against the strict one.
     fn check(&self, from: &Snapshot, to: Pose) -> Result<(), DriveError<R::Error>> {
         let strict = &self.file.envelope;
         strict.check_pose(to).map_err(DriveError::Envelope)?;
+        self.tolerant()
+            .check_path(from.pose(), to)
+            .map_err(DriveError::Envelope)
+    }
+
+    /// The envelope widened by the tolerance, since arms may stand off their goals by as much.
+    pub(crate) fn tolerant(&self) -> Envelope {
+        let strict = &self.file.envelope;
         let slack = self.file.motion.tolerance_rad;
         let widen = |mut limits: arms::Limits| {
             limits.min = ArmAngle::from_rad(limits.min.rad() - slack);
             limits.max = ArmAngle::from_rad(limits.max.rad() + slack);
             limits
         };
-        let wide = Envelope {
+        Envelope {
             light: widen(strict.light),
             sensor: widen(strict.sensor),
             separation_rad: (strict.separation_rad - 2.0 * slack).max(0.0),
             can_pass: strict.can_pass,
-        };
-        wide.check_path(from.pose(), to).map_err(DriveError::Envelope)
+        }
     }
 
     async fn leg(&mut self, to: Pose, settle: Duration) -> Result<Snapshot, DriveError<R::Error>> {

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use dynamixel2::{Bus, ReadError, WriteError};
 use serialport::TTYPort;
 
+use super::node::BROADCAST;
 use super::port;
 use crate::{BusSettings, RigError};
 
@@ -35,6 +36,16 @@ const PING: u8 = 0x01;
 /// Parameters of the answer to a ping: model number and firmware version. No register block of this length is read.
 const PING_REPLY: usize = 3;
 
+/// All answers to a ping to all are there after this and their time on the wire: each device waits for its turn, 3 ms
+/// for each id before it (ROBOTIS' SDK, `broadcastPing`).
+const ALL_ANSWERED: Duration = Duration::from_millis(3 * 253 + 16);
+
+/// Devices whose answers to a ping to all are waited for; a rig has three.
+const DEVICES: u32 = 32;
+
+/// Damaged answers to a ping to all after which no more are read.
+const DAMAGED_MAX: usize = 16;
+
 /// One transaction: a packet and the status packets that must follow, in their order.
 #[derive(Debug)]
 pub(super) struct Request {
@@ -56,6 +67,9 @@ pub(super) struct Reply {
     /// As many as were asked for.
     pub(super) parameters: Vec<u8>,
 }
+
+/// Ids that answered, and what they said.
+pub(super) type Answers = Vec<(u8, Vec<u8>)>;
 
 /// Why a transaction failed, with the id that should have answered.
 #[derive(Debug)]
@@ -194,6 +208,38 @@ impl Line {
                 Err(cause) => return Err(cause),
             }
         }
+    }
+
+    /// Pings all devices at once; gives the ids and parameters of all answers, and how many more were damaged.
+    pub(super) fn ping_all(&mut self) -> Result<(Answers, usize), Cause> {
+        let request = Request {
+            id: BROADCAST,
+            instruction: PING,
+            parameters: Vec::new(),
+            replies: Vec::new(),
+        };
+        self.send(&request)?;
+        let answer = Duration::from_secs_f64(
+            ((STATUS_OVERHEAD + PING_REPLY) * 10) as f64 / f64::from(self.settings.baud),
+        );
+        let deadline = Instant::now() + ALL_ANSWERED + DEVICES * answer;
+        let (mut answers, mut damaged) = (Answers::new(), 0);
+        while damaged < DAMAGED_MAX {
+            // The crate panics on an impossible length, see `transact`.
+            match catch_unwind(AssertUnwindSafe(|| self.receive(deadline))) {
+                Ok(Ok((id, reply))) if reply.parameters.len() == PING_REPLY => {
+                    answers.push((id, reply.parameters));
+                }
+                Ok(Err(Cause::Silence)) => break,
+                Ok(Err(cause @ Cause::Gone(_))) => return Err(cause),
+                Ok(_) => damaged += 1,
+                Err(_) => {
+                    damaged += 1;
+                    break;
+                }
+            }
+        }
+        Ok((answers, damaged))
     }
 
     /// Throws away what lies in the input buffers, sends a packet and says until when its replies are due.

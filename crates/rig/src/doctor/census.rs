@@ -1,0 +1,162 @@
+use std::path::Path;
+
+use super::Finding;
+use crate::dynamixel::{BAUD_RATES, Census, Heard};
+use crate::{Device, RigError, RigFile};
+
+const CHECK: &str = "devices";
+
+/// Asks who is there at the rig file's baud rate, and at all others where somebody is missing. Opens and locks the
+/// port and releases it again; blocks for about a second, several where somebody is missing.
+///
+/// Returns the devices of the rig file that answer at its baud rate, under their ids.
+pub fn census(port: &Path, file: &RigFile, tell: &mut dyn FnMut(Finding)) -> Vec<Device> {
+    match attempt(port, file, tell) {
+        Ok(present) => present,
+        Err(error) => {
+            tell(Finding::error(CHECK, &error));
+            Vec::new()
+        }
+    }
+}
+
+fn attempt(port: &Path, file: &RigFile, tell: &mut dyn FnMut(Finding)) -> Result<Vec<Device>, RigError> {
+    let baud = file.bus.baud;
+    let here = Census::take(port, &file.bus, baud)?;
+    let wanted = wanted(file);
+    let answers = |id: u8| here.heard.iter().any(|device| device.id == id);
+    let (present, missing): (Vec<_>, Vec<_>) = wanted.into_iter().partition(|&(_, id)| answers(id));
+    let strangers: Vec<_> = here
+        .heard
+        .iter()
+        .filter(|device| wanted.iter().all(|&(_, id)| id != device.id))
+        .copied()
+        .collect();
+    if missing.is_empty() {
+        let text = format!("all three answer at {baud} baud: {}", listed(&here.heard));
+        tell(Finding::ok(CHECK, text));
+    }
+    if here.damaged > 0 {
+        let text = format!("{} damaged answers at {baud} baud", here.damaged);
+        let remedy =
+            "two devices with one id, a loose cable, a missing ground, or an adapter that echoes (bus.echo)";
+        tell(Finding::warn(CHECK, text, remedy));
+    }
+    if !strangers.is_empty() && missing.is_empty() {
+        let text = format!("there are more than the rig file names: {}", listed(&strangers));
+        tell(Finding::warn(
+            CHECK,
+            text,
+            "take them off the bus, or correct the ids",
+        ));
+    }
+    if !missing.is_empty() {
+        let elsewhere = elsewhere(port, file)?;
+        for (device, id) in missing {
+            let remedy = remedy(device, id, baud, &strangers, &elsewhere);
+            let text = format!("{device} (id {id}) gives no reply at {baud} baud");
+            tell(Finding::fail(CHECK, text, remedy));
+        }
+    }
+    Ok(present.into_iter().map(|(device, _)| device).collect())
+}
+
+/// The devices that a rig file names, and their ids.
+fn wanted(file: &RigFile) -> [(Device, u8); 3] {
+    [
+        (Device::Light, file.arms[0].id),
+        (Device::Sensor, file.arms[1].id),
+        (Device::Photometer, file.photometer.id),
+    ]
+}
+
+/// Who answers at the other baud rates.
+fn elsewhere(port: &Path, file: &RigFile) -> Result<Vec<(u32, Heard)>, RigError> {
+    let mut found = Vec::new();
+    for (_, baud) in BAUD_RATES {
+        if baud == file.bus.baud {
+            continue;
+        }
+        let census = match Census::take(port, &file.bus, baud) {
+            // An adapter that cannot do it does not hide a device at it.
+            Err(RigError::PortUnusable { .. }) => continue,
+            other => other?,
+        };
+        found.extend(census.heard.into_iter().map(|device| (baud, device)));
+    }
+    Ok(found)
+}
+
+/// What to do about a device that does not answer, from who else does.
+fn remedy(device: Device, id: u8, baud: u32, strangers: &[Heard], elsewhere: &[(u32, Heard)]) -> String {
+    if let Some((at, _)) = elsewhere.iter().find(|(_, heard)| heard.id == id) {
+        let code = BAUD_RATES.iter().find(|&&(_, rate)| rate == baud);
+        let code = code.map_or(0, |&(code, _)| code);
+        return format!(
+            "it answers at {at} baud: set bus.baud = {at}, or write {code} to its address 8 at {at} baud"
+        );
+    }
+    let alike = |heard: &&Heard| (heard.name() == Some("photometer")) == (device == Device::Photometer);
+    if let Some(stranger) = strangers.iter().find(alike) {
+        return format!(
+            "{} answers under an id that the rig file does not name: correct the id, or write {id} to its address 7",
+            named(stranger)
+        );
+    }
+    if let Some((at, stranger)) = elsewhere.iter().find(|(_, heard)| alike(&heard)) {
+        return format!(
+            "{} answers at {at} baud: set its id and baud rate",
+            named(stranger)
+        );
+    }
+    "check its power and its cable; nobody answers under this id at any baud rate".to_owned()
+}
+
+fn listed(devices: &[Heard]) -> String {
+    devices.iter().map(named).collect::<Vec<_>>().join(", ")
+}
+
+fn named(device: &Heard) -> String {
+    match device.name() {
+        Some(name) => format!("{name} (id {})", device.id),
+        None => format!("model {} (id {})", device.model, device.id),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SERVO: Heard = Heard {
+        id: 1,
+        model: 1020,
+        firmware: 45,
+    };
+
+    #[test]
+    fn the_remedy_follows_from_who_else_answers() {
+        let to = |device, id, strangers: &[Heard], elsewhere: &[(u32, Heard)]| {
+            remedy(device, id, 1_000_000, strangers, elsewhere)
+        };
+        let told = to(Device::Light, 1, &[], &[(57_600, SERVO)]);
+        assert_eq!(
+            told,
+            "it answers at 57600 baud: set bus.baud = 57600, or write 3 to its address 8 at 57600 baud"
+        );
+        let told = to(Device::Light, 9, &[SERVO], &[]);
+        assert!(
+            told.starts_with("XM430-W350 (id 1) answers under an id") && told.contains("write 9"),
+            "{told}"
+        );
+        let told = to(Device::Photometer, 3, &[SERVO], &[]);
+        assert!(
+            told.starts_with("check its power"),
+            "a servo is no photometer: {told}"
+        );
+        let told = to(Device::Sensor, 2, &[], &[(57_600, SERVO)]);
+        assert!(
+            told.starts_with("XM430-W350 (id 1) answers at 57600 baud"),
+            "{told}"
+        );
+    }
+}

@@ -1,0 +1,63 @@
+use std::path::Path;
+
+use rustix::fs::statvfs;
+
+use super::Finding;
+
+/// What a run takes, bytes: its MERL table alone has 35 MB.
+const RUN: u64 = 60_000_000;
+
+/// Room for so many runs is none that will last the week.
+const RUNS: u64 = 100;
+
+/// How much room there is for run directories below a directory, which may not exist yet.
+pub fn disk(directory: &Path) -> Finding {
+    let existing = directory.ancestors().find(|path| path.is_dir());
+    let place = existing
+        .filter(|path| !path.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let free = match statvfs(place) {
+        Ok(system) => system.f_bavail * system.f_frsize,
+        Err(error) => {
+            let text = format!("{}: {error}", place.display());
+            return Finding::fail("disk", text, "name a directory that can be read");
+        }
+    };
+    judged(directory, free)
+}
+
+fn judged(directory: &Path, free: u64) -> Finding {
+    let text = format!(
+        "{:.1} GB free for {}, room for {} runs",
+        free as f64 / 1e9,
+        directory.display(),
+        free / RUN
+    );
+    match free / RUN {
+        0 | 1 => Finding::fail("disk", text, "make room: a run could not be written to its end"),
+        2..RUNS => Finding::warn("disk", text, "make room, or give another directory"),
+        _ => Finding::ok("disk", text),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::doctor::Verdict;
+
+    #[test]
+    fn room_is_judged_by_what_a_run_takes() {
+        let verdict = |bytes| judged(Path::new("runs"), bytes).verdict;
+        assert_eq!(verdict(50_000_000), Verdict::Fail);
+        assert_eq!(verdict(1_000_000_000), Verdict::Warn);
+        assert_eq!(verdict(100_000_000_000), Verdict::Ok);
+    }
+
+    #[test]
+    fn a_directory_that_is_still_to_be_made_lies_somewhere() {
+        let place = tempfile::tempdir().unwrap();
+        let finding = disk(&place.path().join("not/yet"));
+        assert!(finding.text.contains("GB free for"), "{finding:?}");
+        assert!(disk(Path::new("not/yet/here")).text.contains("GB free for"));
+    }
+}
