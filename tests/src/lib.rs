@@ -3,8 +3,12 @@
 
 mod captured;
 mod finished;
+mod kills;
+mod service;
 mod simulator;
 
 pub use captured::{Captured, difference, entries};
 pub use finished::{Finished, run};
+pub use kills::{Tally, kills};
+pub use service::Service;
 pub use simulator::Simulator;

@@ -57,7 +57,7 @@ pub(crate) enum Command {
         #[command(flatten)]
         output: Output,
     },
-    /// Make everything in a run directory again from its journal.
+    /// Make everything in a run directory again from its journal, or from the store of the daemon that captured it.
     Reconstruct {
         /// The run directory.
         run: PathBuf,

@@ -23,6 +23,8 @@ use crate::{
 const ASKS: usize = 64;
 /// Most jobs that are over, and most runs, in one answer.
 const LISTED: u32 = 500;
+/// Most bytes of a job file.
+const JOB_BYTES: usize = 64 * 1024;
 /// Ids of events in one life of the daemon.
 const EVENTS_PER_LIFE: u64 = 1 << 32;
 
@@ -115,6 +117,12 @@ impl Daemon {
 
     /// Reads a job file and checks that this rig can do it.
     async fn order(&self, job: String, name: String) -> Result<Order, Refusal> {
+        if job.len() > JOB_BYTES {
+            return Err(Refusal::new(
+                RefusalKind::Invalid,
+                format!("the job file has {} bytes, allowed are {JOB_BYTES}", job.len()),
+            ));
+        }
         let shared = self.shared.clone();
         blocking(move || {
             let order = Order::parse(

@@ -97,7 +97,9 @@ pub(crate) struct Queue {
     moving: bool,
     /// Whether no job may start that nobody said anything about since the program began.
     held: bool,
-    closing: Option<oneshot::Sender<()>>,
+    closing: bool,
+    /// Whom to tell once it has ended.
+    closed: Vec<oneshot::Sender<()>>,
     _lock: Lock,
 }
 
@@ -128,7 +130,8 @@ impl Queue {
             jobs,
             current: None,
             moving: false,
-            closing: None,
+            closing: false,
+            closed: Vec::new(),
             _lock: lock,
         })
     }
@@ -139,15 +142,24 @@ impl Queue {
         mut asks: mpsc::Receiver<Ask>,
         mut news: mpsc::UnboundedReceiver<News>,
     ) {
+        let mut orphaned = false;
         loop {
-            if self.closing.is_some() && self.current.is_none() && !self.moving {
+            if self.closing && self.current.is_none() && !self.moving {
                 break;
             }
             self.next().await;
             tokio::select! {
                 biased;
                 Some(news) = news.recv() => self.hear(news).await,
-                Some(ask) = asks.recv() => self.answer(ask).await,
+                ask = asks.recv(), if !orphaned => match ask {
+                    Some(ask) => self.answer(ask).await,
+                    // The last handle was dropped without a word.
+                    None => {
+                        orphaned = true;
+                        self.end();
+                    }
+                },
+                else => break,
             }
         }
         let (reply, closed) = oneshot::channel();
@@ -156,15 +168,27 @@ impl Queue {
         }
         self.shared.store.close().await;
         self.shared.log.close();
-        if let Some(reply) = self.closing {
+        for reply in self.closed {
             let _ = reply.send(());
         }
+    }
+
+    /// Has the reading finished and the capture ended.
+    fn end(&mut self) {
+        self.closing = true;
+        self.shared.command.send_if_modified(|command| {
+            let end = matches!(command, Command::Run | Command::Pause);
+            if end {
+                *command = Command::Finish;
+            }
+            end
+        });
     }
 
     /// Brings the next job forward, where nothing stands in the way.
     async fn next(&mut self) {
         self.held &= !self.jobs.is_empty();
-        if self.current.is_some() || self.closing.is_some() {
+        if self.current.is_some() || self.closing {
             return;
         }
         let ahead = |job: &&Job| matches!(job.state, JobState::Queued | JobState::AwaitingSpecimen);
@@ -202,7 +226,7 @@ impl Queue {
         if self.moving {
             return Err(Refusal::conflict("the arms are being moved by hand"));
         }
-        if self.closing.is_some() {
+        if self.closing {
             return Err(Refusal::unavailable("the daemon is shutting down"));
         }
         Ok(())
@@ -263,14 +287,8 @@ impl Queue {
                 self.reply(reply, &what, result).await;
             }
             Ask::Shutdown { reply } => {
-                self.closing = Some(reply);
-                self.shared.command.send_if_modified(|command| {
-                    let end = matches!(command, Command::Run | Command::Pause);
-                    if end {
-                        *command = Command::Finish;
-                    }
-                    end
-                });
+                self.closed.push(reply);
+                self.end();
             }
         }
     }
@@ -295,7 +313,7 @@ impl Queue {
     }
 
     async fn submit(&mut self, order: &Order, by: &str) -> Result<Job, Refusal> {
-        if self.closing.is_some() {
+        if self.closing {
             return Err(Refusal::unavailable("the daemon is shutting down"));
         }
         if self.jobs.len() >= WAITING {
@@ -438,21 +456,22 @@ impl Queue {
 
     async fn ended(&mut self, ending: Ending) {
         let Some(id) = self.current.take() else { return };
+        let (cause, why) = match ending {
+            Ending::Done => (Cause::Complete, None),
+            Ending::Failed { why } => (Cause::Fail, Some(why)),
+            Ending::Interrupted { why, fault } => {
+                if let Some(code) = fault {
+                    self.latch(code, why.clone()).await;
+                }
+                (Cause::Interrupt, Some(why))
+            }
+        };
+        self.change(id, cause, why).await;
         self.shared.view.send_modify(|view| {
             view.job = None;
             view.run = None;
             view.progress = None;
         });
-        match ending {
-            Ending::Done => self.change(id, Cause::Complete, None).await,
-            Ending::Failed { why } => self.change(id, Cause::Fail, Some(why)).await,
-            Ending::Interrupted { why, fault } => {
-                if let Some(code) = fault {
-                    self.latch(code, why.clone()).await;
-                }
-                self.change(id, Cause::Interrupt, Some(why)).await;
-            }
-        }
     }
 
     /// Latches a fault. The first one that is not acknowledged is shown.

@@ -156,7 +156,9 @@ impl StoreError {
         let (Self::Open { source, .. } | Self::Query { source, .. }) = self else {
             return FaultCode::Store;
         };
-        let code = source.as_database_error().and_then(|error| error.code());
+        let code = source
+            .as_database_error()
+            .and_then(sqlx::error::DatabaseError::code);
         let code = code.and_then(|code| code.parse::<u32>().ok());
         match code.map(|code| code & 0xFF) {
             Some(FULL) => FaultCode::DiskFull,

@@ -78,7 +78,8 @@ fn records() -> Vec<Record> {
 }
 
 fn append(journal: &mut FileJournal, record: &Record) {
-    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+    let runtime = tokio::runtime::Builder::new_current_thread().build();
+    let runtime = runtime.expect("the system has threads");
     runtime
         .block_on(journal.append(record))
         .expect("room on the disk");

@@ -260,6 +260,103 @@ async fn an_emergency_stop_halts_arms_on_their_way_at_once() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn a_stop_decelerates_on_the_profile_without_swinging_back() {
+    let mut scene = Scene::new(SHORT, "imperfections = \"none\"").await;
+    let (control, bench) = (scene.control.clone(), scene.bench.clone());
+    let deceleration = scene
+        .drive
+        .file()
+        .arm(arms::Arm::Light)
+        .profile
+        .acceleration_rad_s2;
+    let (tell, mut watched) = tokio::sync::mpsc::unbounded_channel();
+    let mut seen = false;
+    let outcome = scene.run(move |event| {
+        // The first step with the lamp on has a long way to go.
+        if let Event::Step { sweep, .. } = event
+            && sweep != sweep::Sweep::Dark
+            && !std::mem::replace(&mut seen, true)
+        {
+            let (control, bench, tell) = (control.clone(), bench.clone(), tell.clone());
+            tokio::spawn(async move {
+                tokio::time::sleep(Duration::from_millis(500)).await;
+                for ms in 0..1000 {
+                    if ms == 20 {
+                        control.send_replace(Command::Stop);
+                    }
+                    let _ = tell.send(bench.pose().light.rad());
+                    tokio::time::sleep(Duration::from_millis(1)).await;
+                }
+            });
+        }
+    });
+    assert_eq!(outcome.await.unwrap(), Outcome::Stopped);
+    let mut way = Vec::new();
+    while let Some(rad) = watched.recv().await {
+        way.push(rad);
+    }
+    let velocity = (way[20] - way[10]) / 0.01;
+    assert!(velocity.abs() > 0.5, "stopped while it moves: {velocity} rad/s");
+    let steps: Vec<f64> = way
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]) * velocity.signum())
+        .collect();
+    assert!(steps.iter().all(|&step| step >= -1e-9), "it never swings back");
+    let braked = (way[999] - way[20]).abs();
+    let ideal = velocity * velocity / (2.0 * deceleration);
+    // The goal is ahead by what the arm goes on within the adapter's latency, and a count.
+    assert!(
+        braked > 0.9 * ideal && braked < ideal + velocity.abs() * 0.005 + 0.005,
+        "{braked} rad instead of {ideal} rad"
+    );
+    scene.assert_safe();
+    scene.control.send_replace(Command::Run);
+    assert_eq!(
+        scene.run(|_| ()).await.unwrap(),
+        Outcome::Done,
+        "it can be resumed"
+    );
+    assert_complete(&scene.journal);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_resumed_run_tells_by_how_much_a_pose_differs_now() {
+    let sim = "specimen = \"lambert:0.5\"\nimperfections = \"none\"";
+    let mut scene = Scene::new(SHORT, sim).await;
+    let stop = after(30, &scene.control, Command::Finish);
+    assert_eq!(scene.run(stop).await.unwrap(), Outcome::Stopped);
+    scene.control.send_replace(Command::Run);
+    let mut told = Vec::new();
+    let outcome = scene.run(|event| {
+        if let Event::Repeat {
+            reading,
+            difference_rel,
+        } = event
+        {
+            told.push((reading.step, reading.sweep, difference_rel));
+        }
+    });
+    assert_eq!(outcome.await.unwrap(), Outcome::Done);
+    let [(step, sweep, difference_rel)] = told[..] else {
+        panic!("{told:?}");
+    };
+    assert_eq!((sweep, difference_rel), (sweep::Sweep::Repeat, 0.0));
+    let accepted = scene.journal.accepted();
+    assert!(
+        accepted
+            .iter()
+            .any(|reading| reading.step == step && reading.lamp)
+    );
+    let repeats = scene
+        .journal
+        .records
+        .iter()
+        .filter(|record| matches!(record, Record::Repeat { .. }));
+    assert_eq!(repeats.count(), 1, "and the journal has it");
+    assert_complete(&scene.journal);
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_panic_of_whoever_watches_leaves_the_rig_safe() {
     let mut panic_at = 1;
     loop {

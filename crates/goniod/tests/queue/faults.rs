@@ -1,0 +1,174 @@
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, SystemTime};
+
+use firmware_sim::Server;
+use goniod::{Action, Daemon, Events, FaultCode, FaultView, Job, JobState, Settings};
+use rig::RigFile;
+use sqlx::{Connection, SqliteConnection};
+
+use crate::bench::{Bench, idle, on_stage, operator, readings, rig, state, submission};
+
+/// Real time, so that there is time for a mishap.
+const REAL: &str = "sim.clock = \"real\"\n";
+
+/// The fault that ended a job, after it was interrupted.
+async fn interrupted(daemon: &Daemon, events: &mut Events, job: &Job) -> FaultView {
+    state(events, job.id, JobState::Interrupted).await;
+    idle(daemon).await.fault.expect("a fault is latched")
+}
+
+/// Acknowledges and goes on; every step must be there once in the end.
+async fn finish(daemon: &Daemon, events: &mut Events, job: &Job) {
+    if daemon.rig().borrow().fault.is_some() {
+        daemon.acknowledge(&operator()).await.unwrap();
+    }
+    daemon.act(&operator(), job.id, Action::Resume).await.unwrap();
+    let done = state(events, job.id, JobState::Done).await;
+    let run = done.run.unwrap();
+    let mut steps: Vec<usize> = daemon
+        .readings(&run)
+        .await
+        .unwrap()
+        .iter()
+        .filter(|reading| reading.accepted)
+        .map(|reading| reading.step)
+        .collect();
+    steps.sort_unstable();
+    let planned = daemon.run(&run).await.unwrap().planned as usize;
+    assert_eq!(steps, (0..planned).collect::<Vec<_>>());
+}
+
+fn plug_in(link: &Path, rig: &str) -> Server {
+    let mut server = Server::start(&RigFile::parse(rig, "rig.toml".as_ref()).unwrap()).unwrap();
+    server.link(link).unwrap();
+    server
+}
+
+#[tokio::test]
+async fn a_port_that_is_pulled_and_comes_back_under_another_name() {
+    let bench = Bench::new("");
+    // As /dev/serial/by-id has it: one name, whatever the system calls the port today.
+    let link = bench.folder.path().join("by-id");
+    let bench = Bench {
+        rig: format!("[bus]\nport = \"{}\"\n[sim]\nclock = \"real\"\n", link.display()),
+        ..bench
+    };
+    let server = plug_in(&link, &bench.rig);
+    let old_name = server.path().to_owned();
+    let daemon = bench.open().await;
+    let mut events = daemon.events(None);
+    let job = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    readings(&mut events, 3).await;
+    drop(server);
+    let fault = interrupted(&daemon, &mut events, &job).await;
+    assert!(
+        matches!(fault.code, FaultCode::Disconnected | FaultCode::NoReply),
+        "{fault:?}"
+    );
+    rig(&daemon, |rig| !rig.connected).await;
+    let mut taken = Vec::new();
+    let _server = loop {
+        let server = plug_in(&link, "");
+        if server.path() != old_name {
+            break server;
+        }
+        // Kept, so that the system does not give out this name again.
+        taken.push(server);
+    };
+    rig(&daemon, |rig| rig.connected).await;
+    finish(&daemon, &mut events, &job).await;
+    daemon.shutdown().await;
+}
+
+#[tokio::test]
+async fn a_database_that_another_program_locks() {
+    let bench = Bench::new(REAL);
+    let daemon = bench.open().await;
+    let mut events = daemon.events(None);
+    let job = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    readings(&mut events, 2).await;
+    let path = format!("sqlite://{}", bench.data().join("goniod.db").display());
+    let mut other = SqliteConnection::connect(&path).await.unwrap();
+    // Competes with the daemon for the lock until it has it.
+    while sqlx::query("BEGIN IMMEDIATE").execute(&mut other).await.is_err() {}
+    let view = rig(&daemon, |rig| rig.fault.is_some()).await;
+    let fault = view.fault.expect("just seen");
+    assert_eq!(fault.code, FaultCode::Store);
+    assert!(fault.text.contains("locked"), "{fault:?}");
+    sqlx::query("ROLLBACK").execute(&mut other).await.unwrap();
+    other.close().await.unwrap();
+    idle(&daemon).await;
+    daemon.shutdown().await;
+
+    let bench = Bench {
+        rig: String::new(),
+        ..bench
+    };
+    let daemon = bench.open().await;
+    let mut events = daemon.events(None);
+    // The fault could not be stored and is forgotten; the run is interrupted all the same.
+    finish(&daemon, &mut events, &job).await;
+    daemon.shutdown().await;
+}
+
+#[tokio::test]
+async fn a_run_directory_that_cannot_be_written_is_made_from_the_store_later() {
+    let bench = Bench::new("");
+    let runs = bench.data().join("runs");
+    std::fs::create_dir_all(bench.data()).unwrap();
+    // Nothing can be made below a file, whoever asks.
+    std::fs::write(&runs, "in the way").unwrap();
+    let daemon = bench.open().await;
+    let mut events = daemon.events(None);
+    let job = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    let fault = interrupted(&daemon, &mut events, &job).await;
+    assert_eq!(fault.code, FaultCode::Report, "{fault:?}");
+    assert!(fault.text.contains("runs"), "{fault:?}");
+    std::fs::remove_file(&runs).unwrap();
+    finish(&daemon, &mut events, &job).await;
+    let run = daemon.job(job.id).await.unwrap().run.unwrap();
+    let directory = daemon.run(&run).await.unwrap().directory;
+    let brdf = std::fs::read(directory.join("brdf.binary")).unwrap();
+    std::fs::remove_dir_all(&runs).unwrap();
+    daemon.rebuild(&run).await.unwrap();
+    assert!(brdf == std::fs::read(directory.join("brdf.binary")).unwrap());
+    daemon.shutdown().await;
+    std::fs::remove_dir_all(&runs).unwrap();
+    assert!(
+        goniod::rebuild(&directory).await.unwrap().is_some(),
+        "without a daemon too"
+    );
+    assert!(brdf == std::fs::read(directory.join("brdf.binary")).unwrap());
+}
+
+static BACK_S: AtomicU64 = AtomicU64::new(0);
+
+fn clock() -> SystemTime {
+    SystemTime::now() - Duration::from_secs(BACK_S.load(Ordering::Relaxed))
+}
+
+#[tokio::test]
+async fn a_clock_that_steps_back_changes_no_order() {
+    let bench = Bench::new("");
+    let settings = Settings {
+        clock,
+        ..bench.settings()
+    };
+    let daemon = Daemon::open(settings.clone()).await.unwrap();
+    let mut events = daemon.events(None);
+    let first = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    readings(&mut events, 5).await;
+    BACK_S.store(24 * 3600, Ordering::Relaxed);
+    let second = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    assert!(second.submitted < first.submitted && second.place > first.place);
+    state(&mut events, first.id, JobState::Done).await;
+    state(&mut events, second.id, JobState::Done).await;
+    let last = daemon.events(Some(0)).next().await.unwrap().id;
+    daemon.shutdown().await;
+    let daemon = Daemon::open(settings).await.unwrap();
+    daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    let next = daemon.events(Some(0)).next().await.unwrap().id;
+    assert!(next > last, "event ids go on: {last}, {next}");
+    daemon.shutdown().await;
+}
