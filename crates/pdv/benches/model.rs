@@ -1,4 +1,4 @@
-//! Cost of the separable model in units of what it cannot do without, and of filling a table.
+//! Cost of the models in units of what they cannot do without, beside a trilinear lookup, and of filling a table.
 
 use std::hint::black_box;
 use std::time::Duration;
@@ -6,7 +6,7 @@ use std::time::Duration;
 use brdf::{Brdf, Fitted, MerlTable, Spherical};
 use criterion::{BenchmarkGroup, Criterion, measurement::WallTime};
 use glam::DVec3;
-use pdv::{Distribution, Separable, spread};
+use pdv::{Distribution, Observation, Planes, Separable, spread};
 
 fn model() -> Separable {
     let theta_r = 70.0_f64.to_radians();
@@ -17,6 +17,20 @@ fn model() -> Separable {
         .collect();
     let gold = Fitted::named("gold-paint").expect("a fitted material");
     Separable::sample(&gold, theta_r, &deviations, &arc, 0.0).expect("poses exist")
+}
+
+/// The model of three planes and an arc.
+fn planes() -> Planes {
+    let gold = Fitted::named("gold-paint").expect("a fitted material");
+    let plane = |deg: f64| {
+        let theta_r = deg.to_radians();
+        let range = theta_r.sin() - 85.0_f64.to_radians().sin()..=theta_r.sin() + 85.0_f64.to_radians().sin();
+        let spread = spread(Distribution::Lobe, theta_r, &[range], 30, 1.5e-3);
+        let read = |&d: &f64| Observation::of(&gold, theta_r, d);
+        spread.deviations.iter().filter_map(read).collect()
+    };
+    let arc = (0..30).filter_map(|n| Observation::of(&gold, f64::from(n) * 0.05, 0.0));
+    Planes::from_observations(&[20.0, 45.0, 70.0].map(plane), &arc.collect::<Vec<_>>()).expect("poses exist")
 }
 
 /// Pairs of directions, evenly in angle by a golden-ratio sequence.
@@ -78,6 +92,20 @@ fn main() {
             black_box(model.eval(*incident, *exitant));
         }
     });
+    let planes = planes();
+    let reciprocal = seconds(&mut group, "model of planes, 1024 pairs", || {
+        for pair in &pairs {
+            let (incident, exitant) = black_box(pair);
+            black_box(planes.eval(*incident, *exitant));
+        }
+    });
+    let merl = MerlTable::fill(&planes);
+    let lookup = seconds(&mut group, "trilinear MERL lookup, 1024 pairs", || {
+        for pair in &pairs {
+            let (incident, exitant) = black_box(pair);
+            black_box(merl.eval(*incident, *exitant));
+        }
+    });
     group.finish();
 
     let mut group = criterion.benchmark_group("table");
@@ -96,6 +124,14 @@ fn main() {
     group.finish();
     criterion.final_summary();
 
+    for (what, seconds) in [
+        ("three exp_m1", exponentials),
+        ("separable", evaluation),
+        ("planes", reciprocal),
+        ("MERL lookup", lookup),
+    ] {
+        println!("{what}: {:.1} ns", seconds / 1024.0 * 1e9);
+    }
     if evaluation.is_finite() && exponentials.is_finite() {
         let (ns, ratio) = (evaluation / 1024.0 * 1e9, evaluation / exponentials);
         println!("one evaluation takes {ns:.1} ns, {ratio:.2} times three exp_m1 (at most 3)");

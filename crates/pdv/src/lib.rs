@@ -5,6 +5,7 @@
 //! Parameterization". The crate knows nothing of arms, rigs or files.
 
 mod albedo;
+mod bisected;
 mod choice;
 mod compare;
 mod coordinates;
@@ -21,7 +22,9 @@ mod separable;
 mod shape;
 mod sides;
 mod spread;
+mod surface;
 mod sweeps;
+mod table;
 
 pub use albedo::albedo;
 pub use compare::{Channels, Comparison, Draw, Metrics, compare};

@@ -1,30 +1,33 @@
-use brdf::{Brdf, HalfDifference};
+use brdf::Brdf;
 use glam::DVec3;
 
-use crate::lobe::Lobe;
-use crate::shape::Excess;
-use crate::sweeps::{Point, Sweeps};
-use crate::{Error, Factor, FactorTable, Model, Observation, Shape};
-
-/// ε of the errors by which a shape is chosen, sr⁻¹.
-const EPSILON: f64 = 0.1;
-/// How far from the peak, rad, an arc may be read and count as the peak.
-const ON_PEAK: f64 = 1e-6;
+use crate::bisected::Pair;
+use crate::surface::Surface;
+use crate::sweeps::Sweeps;
+use crate::table::Table;
+use crate::{Error, FactorTable, Model, Observation, Shape};
 
 /// A reciprocal BRDF of one or more planes and an arc.
 ///
-/// f = A (cos θ_i cos θ_o)^κ + s V expm1(G(θ_h, θ_d)·F(θ_d)), V = 1/((c_i(1−a)+a)(c_o(1−a)+a)): a diffuse floor and a
-/// lobe G over the half angle whose peak F is read on the arc, where θ_h = 0 and θ_i = θ_o = θ_d. For s → ∞ it is the
-/// product of lobe and Fresnel-like arc; below that a power law whose lobe narrows as its peak rises, as the paper's
-/// Eq. 3 (s = 1, A = 0, V = 1). Everything depends on θ_h, θ_d and the product of the cosines, so that light and
-/// viewer may be swapped.
+/// In the plane f = A (c_i c_o)^κ + s V expm1(G(θ_h, θ_d)·F(θ_d)), c_i and c_o the cosines of the zenith angles,
+/// V = 1/((c_i(1−a)+a)(c_o(1−a)+a)): a diffuse floor and a lobe G over the half angle whose peak F is read on the arc,
+/// where θ_h = 0 and θ_i = θ_o = θ_d. For s → ∞ it is the product of lobe and Fresnel-like arc; below that a power law
+/// whose lobe narrows as its peak rises, as the paper's Eq. 3 (s = 1, A = 0, V = 1).
+///
+/// Out of the plane a pair takes the value of the pair in the plane with the same half angle and the same product of
+/// cosines, B(θ_h, c_i c_o). It always exists, so that nothing is asked for beyond the horizon. Its difference angle is
+/// smaller, cos² θ_d* = c_i c_o + sin² θ_h, and with it what grows towards grazing with the difference angle; 0.4 of
+/// the logarithm by which the pair with the same θ_d and product is brighter is added, at least 0 and at most E/(2 cos²
+/// θ_d + E) ≈ ln(cos θ_d*/cos θ_d), E = sin² θ_h sin² θ_d sin² φ_d. Everything is symmetric, so that light and viewer
+/// may be swapped.
+///
+/// [`Brdf::eval`] reads a table in f32 that was baked of this; [`Planes::exact`] is the formula itself, in f64.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Planes {
-    excess: Excess,
-    /// F over θ_d, rad.
-    f: Factor,
-    /// G over θ_h and θ_d.
-    lobe: Lobe,
+    surface: Surface,
+    table: Table,
+    /// What the table loses.
+    loss: f64,
     error: Option<f64>,
     dropped: usize,
 }
@@ -41,81 +44,45 @@ impl Planes {
     /// than 0.02 rad.
     pub fn from_observations(planes: &[Vec<Observation>], arc: &[Observation]) -> Result<Self, Error> {
         let sweeps = Sweeps::new(planes, arc)?;
-        crate::choice::choose(&sweeps)
-    }
-
-    /// The model of some shape.
-    pub(crate) fn new(sweeps: &Sweeps, shape: Shape) -> Result<Self, Error> {
-        let black = sweeps.least.cmpeq(DVec3::ZERO);
-        let excess = Excess::new(shape, sweeps.least, sweeps.points());
-        let log = |p: &Point| excess.log(p.rgb, p.cos_i, p.cos_o);
-        let on_peak = sweeps.arc.iter().all(|p| p.theta_h.abs() < ON_PEAK);
-        let mut f = Factor::new("F", sweeps.arc.iter().map(|p| (p.theta_d, log(p))))?;
-        let lobe = |f: &Factor| {
-            let ratio = |p: &Point| {
-                let ratio = (log(p) / f.at(p.theta_d)).map(f64::ln);
-                DVec3::select(black, DVec3::ZERO, ratio)
-            };
-            Lobe::new(&sweeps.sides, on_peak, ratio)
-        };
-        let mut g = lobe(&f)?;
-        // An arc beside the peak is brought to it by the lobe, which changes the lobe in turn.
-        for _ in 0..if on_peak { 0 } else { 3 } {
-            let at_peak = |p: &Point| log(p) / g.log(p.theta_h.abs(), p.theta_d, None).map(f64::exp);
-            f = Factor::new("F", sweeps.arc.iter().map(|p| (p.theta_d, at_peak(p))))?;
-            g = lobe(&f)?;
-        }
+        let (surface, error) = crate::choice::choose(&sweeps)?;
+        let light = DVec3::select(sweeps.least.cmpeq(DVec3::ZERO), DVec3::ZERO, DVec3::ONE);
+        let (table, loss) = Table::bake(|pose| surface.at(pose, None), light);
         Ok(Self {
-            excess,
-            f,
-            lobe: g,
-            error: None,
+            surface,
+            table,
+            loss,
+            error,
             dropped: sweeps.dropped,
         })
     }
 
-    pub(crate) fn with_error(self, error: Option<f64>) -> Self {
-        Self { error, ..self }
-    }
-
-    #[inline]
-    fn at(&self, [theta_h, theta_d]: [f64; 2], [cos_i, cos_o]: [f64; 2], without: Option<usize>) -> DVec3 {
-        let g = self.lobe.log(theta_h, theta_d, without).map(f64::exp);
-        self.excess.reflectance(g * self.f.at(theta_d), cos_i, cos_o)
-    }
-
-    /// How well each side is predicted by the others: mean over sides, channels and half angles of
-    /// |ln(f̂ cos θ_i + ε) − ln(f cos θ_i + ε)|. `None` where nothing can be compared.
-    pub(crate) fn cross_validate(&self, sweeps: &Sweeps) -> Option<f64> {
-        let (mut sum, mut sides) = (0.0, 0.0);
-        for (n, side) in sweeps.sides.iter().enumerate() {
-            let reach = self.lobe.reach_without(n) + 1e-9;
-            let points: Vec<&Point> = side.points.iter().filter(|p| p.theta_h.abs() <= reach).collect();
-            let (mut errors, mut weights) = (0.0, 0.0);
-            for (at, p) in points.iter().enumerate() {
-                let next = points[(at + 1).min(points.len() - 1)].theta_h.abs();
-                let weight = next - points[at.saturating_sub(1)].theta_h.abs();
-                let found = self.at([p.theta_h.abs(), p.theta_d], [p.cos_i, p.cos_o], Some(n));
-                let log = |rgb: DVec3| (rgb * p.cos_i + EPSILON).map(f64::ln);
-                errors += weight * (log(found) - log(p.rgb)).abs().element_sum() / 3.0;
-                weights += weight;
-            }
-            if weights > 0.0 {
-                sum += errors / weights;
-                sides += 1.0;
-            }
+    /// Reflectance as [`Brdf::eval`] gives it, but by the formula and in f64, not from the table.
+    pub fn exact(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
+        if !(incident.z > 0.0 && exitant.z > 0.0) {
+            return DVec3::ZERO;
         }
-        (sides > 1.0).then(|| sum / sides)
+        self.surface.reflectance(&Pair::new(incident, exitant))
+    }
+
+    /// What the table loses: mean |ln(1 + f̂ c) − ln(1 + f c)| over pairs in the plane, c = √(cos θ_i cos θ_o), that
+    /// stand for pairs even in angle below 80°.
+    pub fn loss(&self) -> f64 {
+        self.loss
+    }
+
+    /// f32 numbers of the table, 4 bytes each.
+    pub fn numbers(&self) -> usize {
+        self.table.numbers()
     }
 
     /// The shape that was chosen.
     pub fn shape(&self) -> Shape {
-        self.excess.shape
+        self.surface.excess.shape
     }
 
     /// A, the diffuse floor towards the normal, sr⁻¹.
     pub fn diffuse(&self) -> DVec3 {
-        self.excess.diffuse
+        self.surface.excess.diffuse
     }
 
     /// How far each side of a plane is from what the others predict: the mean of
@@ -136,14 +103,14 @@ impl Brdf for Planes {
         if !(incident.z > 0.0 && exitant.z > 0.0) {
             return DVec3::ZERO;
         }
-        self.at(angles(incident, exitant), [incident.z, exitant.z], None)
+        self.table.reflectance(incident, exitant)
     }
 }
 
 impl Model for Planes {
     fn extrapolated(&self, incident: DVec3, exitant: DVec3) -> bool {
-        let [theta_h, theta_d] = angles(incident, exitant);
-        !self.lobe.covers(theta_h) || self.f.extrapolated(theta_d)
+        let pose = Pair::new(incident, exitant).same_half();
+        !self.surface.lobe.covers(pose.theta_h) || self.surface.f.extrapolated(pose.theta_d)
     }
 
     fn about(&self) -> String {
@@ -163,9 +130,12 @@ impl Model for Planes {
         );
         format!(
             "the reciprocal model of {} sides of planes and an arc, with {why}: s = {scale:.3} 1/sr, q = {diffuse:.2}, \
-             a = {shadowing:.2}, κ = {darkening:.2}; {} readings dropped",
-            self.lobe.rows().count(),
-            self.dropped
+             a = {shadowing:.2}, κ = {darkening:.2}; {} readings dropped; as a table of \
+             {} numbers it loses {:.1e} of ln(1 + f cos)",
+            self.surface.lobe.rows().count(),
+            self.dropped,
+            self.numbers(),
+            self.loss
         )
     }
 
@@ -174,7 +144,7 @@ impl Model for Planes {
         let f = FactorTable {
             name: "F",
             variable: "theta_d_deg",
-            rows: self.f.points().map(degrees).collect(),
+            rows: self.surface.f.points().map(degrees).collect(),
         };
         let side = |rows: Vec<(f64, DVec3)>| FactorTable {
             name: "G",
@@ -184,13 +154,8 @@ impl Model for Planes {
                 .map(|(theta_h, log)| (theta_h, log.map(f64::exp)))
                 .collect(),
         };
-        std::iter::once(f).chain(self.lobe.rows().map(side)).collect()
+        std::iter::once(f)
+            .chain(self.surface.lobe.rows().map(side))
+            .collect()
     }
-}
-
-/// θ_h and θ_d of two unit vectors, rad; the same to the last bit where they are swapped.
-#[inline]
-fn angles(incident: DVec3, exitant: DVec3) -> [f64; 2] {
-    let half = HalfDifference::from_directions(incident, exitant);
-    [half.theta_h, half.theta_d]
 }

@@ -1,10 +1,8 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use crate::bisected::Cosines;
 use crate::sweeps::Point;
-
-/// Smallest cosine in the shadowing term, so that it stays finite at the horizon.
-const COS_MIN: f64 = 1e-4;
 
 /// What joins lobe, arc and diffuse floor of [`crate::Planes`]; the same for the channels.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,18 +28,18 @@ impl Shape {
 
     /// s·V, V the shadowing of both directions.
     #[inline]
-    pub(crate) fn lobe_scale(&self, cos_i: f64, cos_o: f64) -> f64 {
-        let one = |cos: f64| cos.max(COS_MIN) * (1.0 - self.shadowing) + self.shadowing;
-        self.scale / (one(cos_i) * one(cos_o))
+    pub(crate) fn lobe_scale(&self, Cosines { product, sum }: Cosines) -> f64 {
+        let (a, b) = (self.shadowing, 1.0 - self.shadowing);
+        self.scale / (product * b * b + sum * a * b + a * a)
     }
 
     /// What the diffuse floor is multiplied by.
     #[inline]
-    pub(crate) fn falloff(&self, cos_i: f64, cos_o: f64) -> f64 {
+    pub(crate) fn falloff(&self, cosines: Cosines) -> f64 {
         if self.darkening == 0.0 {
             return 1.0;
         }
-        (cos_i * cos_o).max(0.0).powf(self.darkening)
+        cosines.product.powf(self.darkening)
     }
 }
 
@@ -71,7 +69,7 @@ impl Excess {
     ) -> Self {
         let smallest = readings
             .clone()
-            .map(|p| p.rgb / shape.falloff(p.cos_i, p.cos_o))
+            .map(|p| p.rgb / shape.falloff(p.cosines))
             .fold(DVec3::INFINITY, DVec3::min);
         let diffuse = shape.diffuse * smallest;
         let black = least.cmpeq(DVec3::ZERO);
@@ -82,7 +80,7 @@ impl Excess {
             most: DVec3::INFINITY,
         };
         let most = readings
-            .map(|p| excess.log(p.rgb, p.cos_i, p.cos_o))
+            .map(|p| excess.log(p.rgb, p.cosines))
             .fold(DVec3::ZERO, DVec3::max);
         Self {
             most: most.map(|log| (Self::RISE * log.exp_m1()).ln_1p()),
@@ -92,15 +90,15 @@ impl Excess {
 
     /// G·F of a reflectance: ln(1 + excess/(s V)).
     #[inline]
-    pub(crate) fn log(&self, rgb: DVec3, cos_i: f64, cos_o: f64) -> DVec3 {
-        let excess = (rgb - self.diffuse * self.shape.falloff(cos_i, cos_o)).max(self.least);
-        (excess / self.shape.lobe_scale(cos_i, cos_o)).map(f64::ln_1p)
+    pub(crate) fn log(&self, rgb: DVec3, cosines: Cosines) -> DVec3 {
+        let excess = (rgb - self.diffuse * self.shape.falloff(cosines)).max(self.least);
+        (excess / self.shape.lobe_scale(cosines)).map(f64::ln_1p)
     }
 
     /// The reflectance of a G·F.
     #[inline]
-    pub(crate) fn reflectance(&self, log: DVec3, cos_i: f64, cos_o: f64) -> DVec3 {
+    pub(crate) fn reflectance(&self, log: DVec3, cosines: Cosines) -> DVec3 {
         let lobe = log.min(self.most).map(f64::exp_m1);
-        self.diffuse * self.shape.falloff(cos_i, cos_o) + lobe * self.shape.lobe_scale(cos_i, cos_o)
+        self.diffuse * self.shape.falloff(cosines) + lobe * self.shape.lobe_scale(cosines)
     }
 }

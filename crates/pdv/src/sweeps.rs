@@ -1,5 +1,6 @@
 use glam::DVec3;
 
+use crate::bisected::{Bisected, Cosines};
 use crate::separable::{THETA_R_SPREAD, steady};
 use crate::{Error, Observation, light_angle};
 
@@ -15,22 +16,37 @@ pub(crate) struct Point {
     pub(crate) theta_h: f64,
     /// Half the angle between the directions, rad.
     pub(crate) theta_d: f64,
+    /// cos θ_i.
     pub(crate) cos_i: f64,
-    pub(crate) cos_o: f64,
+    /// Of both directions.
+    pub(crate) cosines: Cosines,
     /// sr⁻¹, ≥ 0.
     pub(crate) rgb: DVec3,
 }
 
 impl Point {
+    /// Without the side.
+    pub(crate) fn bisected(&self) -> Bisected {
+        Bisected {
+            theta_h: self.theta_h.abs(),
+            theta_d: self.theta_d,
+        }
+    }
+
     /// `None` where a number is not finite or no light can stand there.
     fn new(o: &Observation) -> Option<Self> {
         let alpha = light_angle(o.theta_r, o.deviation)?;
         let theta_h = 0.5 * (alpha + o.theta_r);
+        let theta_d = 0.5 * (alpha - o.theta_r).abs();
         let point = Self {
             theta_h: if theta_h.abs() < SAME { 0.0 } else { theta_h },
-            theta_d: 0.5 * (alpha - o.theta_r).abs(),
+            theta_d,
             cos_i: alpha.cos(),
-            cos_o: o.theta_r.cos(),
+            cosines: Bisected {
+                theta_h: theta_h.abs(),
+                theta_d,
+            }
+            .cosines(),
             rgb: o.rgb.max(DVec3::ZERO),
         };
         (o.rgb.is_finite() && point.theta_h.is_finite()).then_some(point)

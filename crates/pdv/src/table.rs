@@ -1,0 +1,286 @@
+use std::f32::consts::LN_2;
+
+use glam::{DVec3, Vec3, Vec4};
+
+use crate::bisected::{Bisected, Pair, RISE};
+
+/// Nodes over the half angle.
+const COLUMNS: usize = 66;
+/// Nodes over the cosines.
+const ROWS: usize = 20;
+/// Numbers of a row.
+const STRIDE: usize = 3 * COLUMNS;
+/// Half angles, rad, of which one is where a table begins to be logarithmic: whichever loses least.
+const KNEES: [f64; 6] = [1e-4, 1e-3, 4e-3, 1e-2, 2.5e-2, 6e-2];
+/// Pairs by which a table is judged, and their largest zenith angle, rad.
+const DRAWN: u32 = 2000;
+const THETA_MAX: f64 = 80.0 * std::f64::consts::PI / 180.0;
+/// Largest |log₂ f| that is stored; 2⁻¹²⁰ is 7.5e-37 sr⁻¹.
+const LOG_MAX: f64 = 120.0;
+
+/// A reflectance in the plane as a small table in f32, and what makes of it one for all directions.
+///
+/// It holds log₂ f at 55 × 24 nodes, and is linear between them. Over θ_h they stand at even steps of a logarithm of
+/// 1 + tan²(θ_h/2)/k² whose mantissa is not looked up but taken as it stands, over the cosines at even steps of
+/// √(cos θ_i cos θ_o)/cos θ_h: both even about the mirror direction and about the normal, as f is, and both had from
+/// unit vectors with one division and three roots, without angles.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Table {
+    /// log₂ of RGB, θ_h fastest, and a number that is loaded and not used.
+    logs: Vec<f32>,
+    axis: Axis,
+    /// 0 in a black channel, else 1.
+    light: Vec3,
+}
+
+/// The axis of half angles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Axis {
+    /// 1/k² for tan²(θ_h/2).
+    inverse: f32,
+    /// Cells per unit of the last place.
+    cells: f32,
+}
+
+impl Axis {
+    fn new(knee: f64) -> Self {
+        let inverse = (1.0 / (0.5 * knee).tan().powi(2)) as f32;
+        let whole = (1.0 + inverse).to_bits() - 1_f32.to_bits();
+        Self {
+            inverse,
+            cells: (COLUMNS - 1) as f32 / whole as f32,
+        }
+    }
+
+    /// In cells from the mirror direction, 0 … [`COLUMNS`] − 1, of tan²(θ_h/2) ≥ 0.
+    #[inline(always)]
+    fn place(self, tan: f32) -> f32 {
+        // Signed, for which the processor has an instruction.
+        (1.0 + tan * self.inverse)
+            .to_bits()
+            .wrapping_sub(1_f32.to_bits())
+            .cast_signed() as f32
+            * self.cells
+    }
+
+    /// tan²(θ_h/2) of a place.
+    fn tan(self, place: f64) -> f64 {
+        // In f64 for the steps of f32 near 1 are as wide as the first cells.
+        let last = place / f64::from(self.cells) / f64::from(1_u32 << 23);
+        let octave = last.floor();
+        ((1.0 + last - octave) * octave.exp2() - 1.0) / f64::from(self.inverse)
+    }
+}
+
+/// Where two pairs of directions stand in a table, in cells: the columns of both, then the rows of both.
+#[derive(Clone, Copy)]
+struct Places(Vec4);
+
+impl Places {
+    /// Of the sin² θ_h and cos² θ_h of both, and the product of cosines that they share.
+    #[inline(always)]
+    fn new(axis: Axis, sin: [f32; 2], cos: [f32; 2], product: f32) -> Self {
+        // What both need of roots and quotients side by side, for the way through them is what takes the time.
+        let rows = (Vec4::new(product, product, 1.0, 1.0) / Vec4::new(cos[0], cos[1], 1.0, 1.0)).sqrt();
+        let one = Vec4::new(cos[0], cos[1], 1.0, 1.0).sqrt() + Vec4::ONE;
+        let tan = Vec4::new(sin[0], sin[1], 1.0, 1.0) / (one * one);
+        let rows = rows * (ROWS - 1) as f32;
+        Self(Vec4::new(axis.place(tan.x), axis.place(tan.y), rows.x, rows.y))
+    }
+
+    /// The first number of the cells of both, always within the table, and how far in them both stand, as the places.
+    #[inline(always)]
+    fn cells(self) -> ([usize; 2], Vec4) {
+        /// Adding it leaves a whole number in the last bits: cheaper than a conversion, which has to mind what is no
+        /// number.
+        const WHOLE: f32 = 8_388_608.0;
+        /// Just below the last node.
+        const LAST: Vec4 = Vec4::new(
+            (COLUMNS - 1) as f32 - 1e-4,
+            (COLUMNS - 1) as f32 - 1e-4,
+            (ROWS - 1) as f32 - 1e-4,
+            (ROWS - 1) as f32 - 1e-4,
+        );
+        // What is no number becomes 0.
+        let places = self.0.max(Vec4::ZERO).min(LAST);
+        let shifted = (places - Vec4::splat(0.5)).max(Vec4::ZERO) + Vec4::splat(WHOLE);
+        let [a, b, c, d] = shifted.to_array().map(|s| (s.to_bits() & 0x7f) as usize);
+        (
+            [c * STRIDE + 3 * a, d * STRIDE + 3 * b],
+            places - (shifted - Vec4::splat(WHOLE)),
+        )
+    }
+}
+
+impl Table {
+    /// Bakes a reflectance in the plane, sr⁻¹; `light` tells which channels are not black.
+    ///
+    /// Of several tables the one with the least [`Table::error`].
+    pub(crate) fn bake(in_plane: impl Fn(Bisected) -> DVec3, light: DVec3) -> (Self, f64) {
+        let poses: Vec<_> = drawn().map(|pose| (pose, in_plane(pose))).collect();
+        let tables = KNEES.map(|knee| {
+            let table = Self::with_knee(&in_plane, light, knee).settle(&in_plane);
+            let error = table.error(&poses);
+            (table, error)
+        });
+        tables
+            .into_iter()
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .expect("there are several")
+    }
+
+    fn with_knee(in_plane: impl Fn(Bisected) -> DVec3, light: DVec3, knee: f64) -> Self {
+        let axis = Axis::new(knee);
+        let mut logs = Vec::with_capacity(ROWS * STRIDE + 1);
+        for row in 0..ROWS {
+            for column in 0..COLUMNS {
+                let rgb = in_plane(pose(axis, column as f64, row as f64));
+                logs.extend(self::logs(rgb).to_array());
+            }
+        }
+        logs.push(0.0);
+        Self {
+            logs,
+            axis,
+            light: light.as_vec3(),
+        }
+    }
+
+    /// Half of what the table misses in the middle of its cells goes to their corners: a surface between chords.
+    fn settle(mut self, in_plane: impl Fn(Bisected) -> DVec3) -> Self {
+        let mut shift = vec![(Vec3::ZERO, 0.0_f32); ROWS * COLUMNS];
+        for row in 0..ROWS - 1 {
+            for column in 0..COLUMNS - 1 {
+                let pose = pose(self.axis, column as f64 + 0.5, row as f64 + 0.5);
+                let middle = self.at(row * STRIDE + 3 * column, 0.5, 0.5);
+                let missed = logs(in_plane(pose)) - middle.truncate();
+                for (r, c) in [
+                    (row, column),
+                    (row, column + 1),
+                    (row + 1, column),
+                    (row + 1, column + 1),
+                ] {
+                    let (sum, cells) = &mut shift[r * COLUMNS + c];
+                    *sum += missed;
+                    *cells += 1.0;
+                }
+            }
+        }
+        for (node, (sum, cells)) in self.logs.chunks_exact_mut(3).zip(shift) {
+            let node_shift = sum * (0.5 / cells);
+            node.iter_mut()
+                .zip(node_shift.to_array())
+                .for_each(|(log, shift)| *log += shift);
+        }
+        self
+    }
+
+    /// What the table loses: mean |ln(1 + f̂ cos θ_i) − ln(1 + f cos θ_i)| over pairs even in angle below 80°.
+    fn error(&self, poses: &[(Bisected, DVec3)]) -> f64 {
+        let miss = |(pose, f): &(Bisected, DVec3)| {
+            let cos = pose.cosines().product.sqrt();
+            let found = self.reflectance(pose.directions()[0], pose.directions()[1]);
+            let log = |f: DVec3| (f * cos).map(f64::ln_1p);
+            (log(found) - log(*f)).abs().element_sum() / 3.0
+        };
+        poses.iter().map(miss).sum::<f64>() / poses.len() as f64
+    }
+
+    /// log₂ of RGB in the cell that begins at a number; the last lane means nothing.
+    #[inline(always)]
+    fn at(&self, first: usize, across: f32, along: f32) -> Vec4 {
+        let corners = &self.logs[first..first + STRIDE + 7];
+        let near = |at: usize| {
+            let a = Vec4::from_slice(&corners[at..at + 4]);
+            let b = Vec4::from_slice(&corners[at + 3..at + 7]);
+            a + (b - a) * across
+        };
+        let (a, b) = (near(0), near(STRIDE));
+        a + (b - a) * along
+    }
+
+    /// The reflectance of two unit vectors above the horizon, as [`Pair`] has it, the angles and all that follows in
+    /// f32: the sums and differences of which they are made are not, and lose nothing.
+    #[inline]
+    pub(crate) fn reflectance(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
+        let (sum, difference) = (incident + exitant, incident - exitant);
+        let across = (incident.x * exitant.y - incident.y * exitant.x) as f32;
+        let flat = (sum.x * sum.x + sum.y * sum.y) as f32;
+        let up = (sum.z * sum.z) as f32;
+        let sin_d = 0.25 * difference.length_squared() as f32;
+        let product = (incident.z * exitant.z) as f32;
+        // Opposite at the horizon there is no half vector.
+        let length = (flat + up).max(f32::MIN_POSITIVE);
+        let inverse = 1.0 / length;
+        let (sin_h, out) = (flat * inverse, across * across * inverse);
+        let places = Places::new(
+            self.axis,
+            [sin_h, sin_h - out],
+            [up * inverse, product + sin_d],
+            product,
+        );
+        let (cells, within) = places.cells();
+        let near = self.at(cells[0], within.x, within.z);
+        let far = self.at(cells[1], within.y, within.w);
+        let most = std::f32::consts::LOG2_E * out / (0.5 * length + out);
+        let rise = ((far - near) * RISE as f32)
+            .max(Vec4::ZERO)
+            .min(Vec4::splat(most));
+        (exp2(near + rise).truncate() * self.light).as_dvec3()
+    }
+
+    /// Numbers that it consists of.
+    pub(crate) fn numbers(&self) -> usize {
+        // The axis has two, the channels three.
+        self.logs.len() + 5
+    }
+}
+
+/// The pose of a place in cells.
+fn pose(axis: Axis, column: f64, row: f64) -> Bisected {
+    let theta_h = 2.0 * axis.tan(column).max(0.0).sqrt().atan();
+    let share = row / (ROWS - 1) as f64;
+    let sin_d = theta_h.cos() * ((1.0 - share) * (1.0 + share)).max(0.0).sqrt();
+    Bisected {
+        theta_h,
+        theta_d: sin_d.min(1.0).asin(),
+    }
+}
+
+/// 2ˣ to 2e-7 of itself for |x| ≤ 126, in all lanes at once; finite for every x.
+#[inline(always)]
+fn exp2(x: Vec4) -> Vec4 {
+    /// Adding it leaves a whole number in the last bits.
+    const WHOLE: f32 = 12_582_912.0;
+    let x = x.max(Vec4::splat(-126.0)).min(Vec4::splat(126.0));
+    let shifted = x + Vec4::splat(WHOLE);
+    let t = x - (shifted - Vec4::splat(WHOLE));
+    // Taylor of 2ᵗ for |t| ≤ 1/2, in pairs.
+    let pair = |low: f32, high: f32| Vec4::splat(low) + t * high;
+    let square = t * t;
+    let low = pair(1.0, LN_2) + square * pair(LN_2 * LN_2 / 2.0, LN_2 * LN_2 * LN_2 / 6.0);
+    let high = pair(0.009_618_129, 0.001_333_355_8) + square * 0.000_154_035_3;
+    let sum = low + square * square * high;
+    let power = shifted
+        .to_array()
+        .map(|s| f32::from_bits((s.to_bits() << 23).wrapping_add(1_f32.to_bits())));
+    sum * Vec4::from_array(power)
+}
+
+/// log₂ of RGB as it is stored.
+fn logs(rgb: DVec3) -> Vec3 {
+    Vec3::from_array(rgb.to_array().map(|f| f.log2().clamp(-LOG_MAX, LOG_MAX) as f32))
+}
+
+/// Pairs of directions even in angle below 80°, as pairs in the plane; always the same.
+fn drawn() -> impl Iterator<Item = Bisected> {
+    let fraction = |n: u32, ratio: f64| (f64::from(n) * ratio).fract();
+    (0..DRAWN).map(move |n| {
+        // Steps of the plastic number's three-dimensional sequence.
+        let [i, o] =
+            [0.819_172_513_396_164_4, 0.671_043_606_703_789_2].map(|ratio| fraction(n, ratio) * THETA_MAX);
+        let phi = fraction(n, 0.549_700_477_901_970_3) * std::f64::consts::TAU;
+        let direction = |theta: f64, phi: f64| brdf::Spherical { theta, phi }.direction();
+        Pair::new(direction(i, phi), direction(o, 0.0)).same_half()
+    })
+}
