@@ -1,13 +1,14 @@
 //! The capture daemon as a library: a queue of jobs that loses nothing, and the rig that works it off.
 //!
 //! [`Daemon`] is the service: it keeps jobs, runs and readings in a [`Store`], carries one job after the other
-//! through, and obeys an operator at once. [`run`] carries out a single order without it. Front ends send commands
+//! through, and obeys an operator at once; [`http`] lets others use it. [`run`] carries out a single order without it. Front ends send commands
 //! and watch events; none of them drives.
 
 mod daemon;
 mod error;
 mod event;
 mod hand;
+pub mod http;
 mod job;
 mod lock;
 mod order;
@@ -15,6 +16,7 @@ mod queue;
 mod rebuild;
 mod refusal;
 mod run;
+mod service;
 mod shared;
 mod state;
 mod station;
@@ -30,6 +32,7 @@ pub use order::{Order, rig_text};
 pub use rebuild::rebuild;
 pub use refusal::{Refusal, RefusalKind};
 pub use run::{Ended, resume, run};
+pub use service::main;
 pub use state::JobState;
 pub use status::Status;
 pub use store::{Sqlite, Store, StoreError};

@@ -1,0 +1,89 @@
+use serde::Deserialize;
+use utoipa::ToSchema;
+
+/// A job file in JSON, with the keys that config/jobs/quickstart.toml explains.
+///
+/// Only the OpenAPI document is made of it: what a job file may say is decided where TOML is read.
+#[derive(Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "describes, never holds")]
+pub(crate) struct JobFile {
+    /// What lies on the stage, in your own words.
+    #[serde(default)]
+    specimen: String,
+    /// Whether it lies on the stage already; otherwise someone must say so before the job starts.
+    #[serde(default)]
+    on_stage: bool,
+    /// Plane sweeps.
+    #[schema(min_items = 1, max_items = 12)]
+    plane: Vec<PlaneTable>,
+    /// The mirror arc.
+    #[serde(default)]
+    arc: ArcTable,
+    /// How the BRDF is made of the readings.
+    #[serde(default)]
+    reconstruction: ReconstructionTable,
+}
+
+/// One plane sweep.
+#[derive(Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "describes, never holds")]
+struct PlaneTable {
+    /// Where the sensor stands, degrees from the normal.
+    #[schema(minimum = 0, maximum = 85)]
+    theta_r_deg: f64,
+    /// Readings over both sides of the mirror direction.
+    #[schema(minimum = 1, maximum = 2000)]
+    readings: u32,
+    /// How d_p is distributed.
+    #[serde(default)]
+    #[schema(inline)]
+    distribution: DistributionName,
+}
+
+/// The mirror arc.
+#[derive(Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "describes, never holds")]
+struct ArcTable {
+    /// Readings along the arc.
+    #[schema(minimum = 1, maximum = 2000)]
+    readings: u32,
+    /// Deviation from the mirror direction that the arc keeps.
+    #[schema(minimum = -1, maximum = 1)]
+    #[serde(default)]
+    offset: f64,
+}
+
+/// How the BRDF is made of the readings.
+#[derive(Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "describes, never holds")]
+struct ReconstructionTable {
+    /// Which model.
+    #[serde(default)]
+    #[schema(inline)]
+    model: ModelName,
+}
+
+/// How d_p is distributed.
+#[derive(Default, Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+enum DistributionName {
+    #[default]
+    Capped,
+    Paper,
+    Uniform,
+    Lobe,
+}
+
+/// A reconstruction model.
+#[derive(Default, Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+enum ModelName {
+    #[default]
+    Separable,
+    Reciprocal,
+    Planes,
+}

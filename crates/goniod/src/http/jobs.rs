@@ -1,0 +1,129 @@
+use axum::body::Bytes;
+use axum::extract::{Path, Query, State};
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{AppendHeaders, IntoResponse};
+use axum::{Extension, Json};
+use serde::Deserialize;
+use utoipa::IntoParams;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::body;
+use super::job_file::JobFile;
+use super::problem::Problem;
+use super::shared::Shared;
+use crate::{Action, Caller, Job, JobId, PlanView, Submission};
+
+pub(crate) fn routes() -> OpenApiRouter<Shared> {
+    OpenApiRouter::new()
+        .routes(routes!(jobs, submit))
+        .routes(routes!(job))
+        .routes(routes!(act))
+        .routes(routes!(plan))
+}
+
+/// What to call a job.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+struct Naming {
+    /// What messages call the job's file.
+    #[param(max_length = 200)]
+    name: Option<String>,
+}
+
+/// All jobs, the queue among them, in the order in which they are worked off.
+#[utoipa::path(get, path = "/jobs", tag = "queue", responses((status = 200, body = Vec<Job>)))]
+async fn jobs(State(shared): State<Shared>) -> Result<Json<Vec<Job>>, Problem> {
+    Ok(Json(shared.daemon.jobs().await?))
+}
+
+/// Add a job to the queue: a job file, TOML as config/jobs/quickstart.toml explains it, or the same keys in JSON.
+#[utoipa::path(post, path = "/jobs", tag = "queue", params(Naming),
+    request_body(content((JobFile = "application/json"), (String = "application/toml"))),
+    responses((status = 201, body = Job, headers(("Location" = String, description = "Where the job is found"))),
+        (status = 409, body = Problem, content_type = "application/problem+json", description = "Not while the rig is as it is"),
+        (status = 415, body = Problem, content_type = "application/problem+json", description = "Neither TOML nor JSON"),
+        (status = 422, body = Problem, content_type = "application/problem+json", description = "The job file is wrong, or this rig cannot do it")))]
+async fn submit(
+    State(shared): State<Shared>,
+    Extension(by): Extension<Caller>,
+    Query(Naming { name }): Query<Naming>,
+    headers: HeaderMap,
+    text: Bytes,
+) -> Result<impl IntoResponse, Problem> {
+    let name = name
+        .filter(|name| !name.is_empty())
+        .unwrap_or_else(|| "job".to_owned());
+    if name.chars().count() > 200 || name.chars().any(char::is_control) {
+        let why = "name must have at most 200 characters, none of them a control character";
+        return Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, why));
+    }
+    let job = job_text(&headers, &text)?;
+    let job = shared.daemon.submit(&by, Submission { job, name }).await?;
+    let location = format!("/api/v1/jobs/{}", job.id);
+    Ok((
+        StatusCode::CREATED,
+        AppendHeaders([(header::LOCATION, location)]),
+        Json(job),
+    ))
+}
+
+/// One job.
+#[utoipa::path(get, path = "/jobs/{id}", tag = "queue", params(("id" = String, Path, description = "Id of the job")),
+    responses((status = 200, body = Job),
+        (status = 404, body = Problem, content_type = "application/problem+json", description = "There is no such job")))]
+async fn job(State(shared): State<Shared>, Path(id): Path<String>) -> Result<Json<Job>, Problem> {
+    Ok(Json(shared.daemon.job(job_id(&id)?).await?))
+}
+
+/// Do something with one job.
+#[utoipa::path(post, path = "/jobs/{id}/{action}", tag = "queue",
+    params(("id" = String, Path, description = "Id of the job"), ("action" = Action, Path, description = "What to do")),
+    responses((status = 200, body = Job),
+        (status = 404, body = Problem, content_type = "application/problem+json", description = "There is no such job or action"),
+        (status = 409, body = Problem, content_type = "application/problem+json", description = "Not in the job's state")))]
+async fn act(
+    State(shared): State<Shared>,
+    Extension(by): Extension<Caller>,
+    Path((id, action)): Path<(String, String)>,
+) -> Result<Json<Job>, Problem> {
+    let action: Action = serde_json::from_value(action.into())
+        .map_err(|_| Problem::new(StatusCode::NOT_FOUND, "actions are ready, cancel, resume"))?;
+    Ok(Json(shared.daemon.act(&by, job_id(&id)?, action).await?))
+}
+
+/// What would be done for a job file; touches no hardware.
+#[utoipa::path(post, path = "/plan", tag = "queue",
+    request_body(content((JobFile = "application/json"), (String = "application/toml"))),
+    responses((status = 200, body = PlanView),
+        (status = 409, body = Problem, content_type = "application/problem+json", description = "Not while the rig is as it is"),
+        (status = 415, body = Problem, content_type = "application/problem+json", description = "Neither TOML nor JSON"),
+        (status = 422, body = Problem, content_type = "application/problem+json", description = "The job file is wrong, or this rig cannot do it")))]
+async fn plan(
+    State(shared): State<Shared>,
+    headers: HeaderMap,
+    text: Bytes,
+) -> Result<Json<PlanView>, Problem> {
+    Ok(Json(shared.daemon.plan(&job_text(&headers, &text)?).await?))
+}
+
+fn job_id(id: &str) -> Result<JobId, Problem> {
+    id.parse()
+        .map_err(|_| Problem::new(StatusCode::NOT_FOUND, "there is no such job"))
+}
+
+/// The job file of a body as TOML: as it came, or made of JSON with the same keys.
+fn job_text(headers: &HeaderMap, text: &[u8]) -> Result<String, Problem> {
+    let wrong = |why: String| Problem::new(StatusCode::UNPROCESSABLE_ENTITY, why);
+    match body::media_type(headers).as_str() {
+        "application/json" => {
+            let job: toml::Table = body::json(headers, text)?;
+            toml::to_string(&job).map_err(|error| wrong(format!("this JSON is no job file: {error}")))
+        }
+        "application/toml" => String::from_utf8(text.to_vec())
+            .map_err(|error| wrong(format!("the job file is not UTF-8: {error}"))),
+        other => Err(Problem::new(
+            StatusCode::UNSUPPORTED_MEDIA_TYPE,
+            format!("the body is {other:?}, taken are application/toml and application/json"),
+        )),
+    }
+}

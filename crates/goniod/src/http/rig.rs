@@ -1,0 +1,124 @@
+use arms::{Arm, ArmAngle};
+use axum::body::Bytes;
+use axum::extract::State;
+use axum::http::{HeaderMap, StatusCode};
+use axum::{Extension, Json};
+use serde::Deserialize;
+use utoipa::ToSchema;
+use utoipa_axum::{router::OpenApiRouter, routes};
+
+use super::body;
+use super::problem::Problem;
+use super::shared::Shared;
+use crate::{Caller, RigView};
+
+/// What an operator's hand does; answered without a body.
+type Done = Result<StatusCode, Problem>;
+const DONE: StatusCode = StatusCode::NO_CONTENT;
+
+/// Where to move one arm.
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+struct Jog {
+    /// Which arm.
+    #[schema(inline)]
+    arm: ArmName,
+    /// Where to, degrees from the normal, positive towards +x.
+    #[schema(minimum = -90, maximum = 90)]
+    angle_deg: f64,
+}
+
+/// One of the arms.
+#[derive(Clone, Copy, Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+enum ArmName {
+    Light,
+    Sensor,
+}
+
+pub(crate) fn routes() -> OpenApiRouter<Shared> {
+    OpenApiRouter::new()
+        .routes(routes!(rig))
+        .routes(routes!(pause))
+        .routes(routes!(proceed))
+        .routes(routes!(stop))
+        .routes(routes!(estop))
+        .routes(routes!(acknowledge))
+        .routes(routes!(jog))
+        .routes(routes!(park))
+}
+
+/// Where the arms are, and all else that is known of the rig.
+#[utoipa::path(get, path = "/rig", tag = "rig", responses((status = 200, body = RigView)))]
+async fn rig(State(shared): State<Shared>) -> Json<RigView> {
+    Json(shared.daemon.rig().borrow().clone())
+}
+
+/// Finish the reading, then hold.
+#[utoipa::path(post, path = "/pause", tag = "rig", responses((status = 204, description = "Asked for"),
+    (status = 409, body = Problem, content_type = "application/problem+json", description = "Nothing runs")))]
+async fn pause(State(shared): State<Shared>, Extension(by): Extension<Caller>) -> Done {
+    shared.daemon.pause(&by).await?;
+    Ok(DONE)
+}
+
+/// Go on after a pause.
+#[utoipa::path(post, path = "/proceed", tag = "rig", responses((status = 204, description = "Asked for"),
+    (status = 409, body = Problem, content_type = "application/problem+json", description = "Nothing is paused")))]
+async fn proceed(State(shared): State<Shared>, Extension(by): Extension<Caller>) -> Done {
+    shared.daemon.proceed(&by).await?;
+    Ok(DONE)
+}
+
+/// Brake now; the run can be resumed.
+#[utoipa::path(post, path = "/stop", tag = "rig", responses((status = 204, description = "Asked for"),
+    (status = 409, body = Problem, content_type = "application/problem+json", description = "Nothing runs")))]
+async fn stop(State(shared): State<Shared>, Extension(by): Extension<Caller>) -> Done {
+    shared.daemon.stop(&by).await?;
+    Ok(DONE)
+}
+
+/// Emergency stop: arms and lamp at once, and no motion until it is acknowledged.
+#[utoipa::path(post, path = "/estop", tag = "rig", responses((status = 204, description = "Latched")))]
+async fn estop(State(shared): State<Shared>, Extension(by): Extension<Caller>) -> Done {
+    shared.daemon.estop(&by).await?;
+    Ok(DONE)
+}
+
+/// Acknowledge the latched fault: somebody has looked at the rig.
+#[utoipa::path(post, path = "/acknowledge", tag = "rig", responses((status = 204, description = "Acknowledged"),
+    (status = 409, body = Problem, content_type = "application/problem+json", description = "There is no fault")))]
+async fn acknowledge(State(shared): State<Shared>, Extension(by): Extension<Caller>) -> Done {
+    shared.daemon.acknowledge(&by).await?;
+    Ok(DONE)
+}
+
+/// Move one arm by hand, within the envelope.
+#[utoipa::path(post, path = "/jog", tag = "rig", request_body = Jog, responses((status = 204, description = "Arrived"),
+    (status = 409, body = Problem, content_type = "application/problem+json", description = "The rig is busy, or holds a fault"),
+    (status = 422, body = Problem, content_type = "application/problem+json", description = "Not within the envelope"),
+    (status = 503, body = Problem, content_type = "application/problem+json", description = "The rig does not answer")))]
+async fn jog(
+    State(shared): State<Shared>,
+    Extension(by): Extension<Caller>,
+    headers: HeaderMap,
+    text: Bytes,
+) -> Done {
+    let Jog { arm, angle_deg } = body::json(&headers, &text)?;
+    let arm = match arm {
+        ArmName::Light => Arm::Light,
+        ArmName::Sensor => Arm::Sensor,
+    };
+    shared.daemon.jog(&by, arm, ArmAngle::from_deg(angle_deg)).await?;
+    Ok(DONE)
+}
+
+/// Take both arms to rest.
+#[utoipa::path(post, path = "/park", tag = "rig", responses((status = 204, description = "At rest"),
+    (status = 409, body = Problem, content_type = "application/problem+json", description = "The rig is busy, or holds a fault"),
+    (status = 422, body = Problem, content_type = "application/problem+json", description = "No way there within the envelope"),
+    (status = 503, body = Problem, content_type = "application/problem+json", description = "The rig does not answer")))]
+async fn park(State(shared): State<Shared>, Extension(by): Extension<Caller>) -> Done {
+    shared.daemon.park(&by).await?;
+    Ok(DONE)
+}

@@ -1,0 +1,210 @@
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::SystemTime;
+
+use anyhow::Context;
+use clap::{Parser, ValueEnum};
+use rig::RigFile;
+use sd_notify::NotifyState;
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::watch;
+use tokio::task::JoinSet;
+use tracing_subscriber::EnvFilter;
+
+use crate::http::{self, Access, Address, Limits, Listener, Tokens};
+use crate::{Daemon, DaemonError, Settings, Status};
+
+/// Where it is listened on when nothing else is said.
+const LISTEN: &str = "127.0.0.1:4664";
+/// Where the rig file is looked for when none is named.
+const CONFIG: &str = "config/rig.toml";
+/// Threads that answer requests; the rig has one of its own.
+const THREADS: usize = 2;
+
+/// The daemon of a gonio-reflectometer: a queue of jobs, a page to watch them, hands that stop the rig.
+#[derive(Parser)]
+#[command(name = "goniod", version)]
+struct Arguments {
+    /// Rig file [default: config/rig.toml where there is one, else the built-in simulator]
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Where to listen: IP:PORT (port 0 takes a free one) or unix:PATH; can be given several times
+    #[arg(long, value_name = "ADDR", default_value = LISTEN)]
+    listen: Vec<Address>,
+    /// Folder of the store and of the run directories
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    data: PathBuf,
+    /// Token file, made where there is none; needed by whoever comes from outside, and, where it is given, by everyone
+    /// [default: tokens.toml in the data folder, for addresses that other computers reach]
+    #[arg(long, value_name = "FILE")]
+    tokens: Option<PathBuf>,
+    /// Host name under which a browser asks for this daemon, besides localhost and its address; can be given several
+    /// times
+    #[arg(long, value_name = "NAME")]
+    known_as: Vec<String>,
+    /// How the log on stderr is written; RUST_LOG says how much
+    #[arg(long, value_enum, default_value = "human")]
+    log: Log,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Log {
+    /// For people.
+    Human,
+    /// A JSON object a line.
+    Json,
+}
+
+/// Runs the daemon as this process and returns its exit code.
+///
+/// The addresses that it listens on are printed to stdout, one a line, once it answers.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
+    let log = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr);
+    match arguments.log {
+        Log::Human => log.init(),
+        Log::Json => log.json().init(),
+    }
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(THREADS)
+        .enable_all()
+        .build();
+    let ended = runtime
+        .context("cannot start")
+        .and_then(|runtime| runtime.block_on(run(arguments)));
+    match ended {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            tracing::error!("{error:#}");
+            let known = error
+                .chain()
+                .find_map(|cause| cause.downcast_ref::<DaemonError>());
+            ExitCode::from(known.map_or(Status::Invalid, DaemonError::status).code())
+        }
+    }
+}
+
+async fn run(arguments: Arguments) -> anyhow::Result<()> {
+    // Asked for first: a signal during start-up ends it just as well.
+    let ended = terminated()?;
+    let (rig, rig_name) = rig_file(arguments.config.as_deref())?;
+    let daemon = Daemon::open(Settings {
+        rig,
+        rig_name,
+        data: arguments.data.clone(),
+        clock: SystemTime::now,
+    })
+    .await?;
+    let served = serve(&arguments, &daemon, ended).await;
+    daemon.shutdown().await;
+    served
+}
+
+async fn serve(
+    arguments: &Arguments,
+    daemon: &Daemon,
+    ended: impl Future<Output = &'static str>,
+) -> anyhow::Result<()> {
+    let limits = Limits::default();
+    let (close, closing) = watch::channel(());
+    let mut servers = JoinSet::new();
+    for address in &arguments.listen {
+        let listener = Listener::bind(address)
+            .await
+            .with_context(|| format!("--listen: cannot listen on {address}"))?;
+        let address = listener.address()?;
+        let tcp = match &address {
+            Address::Tcp(address) => Some(*address),
+            Address::Unix(_) => None,
+        };
+        let tokens = tokens(arguments, &address)?;
+        let access = Access::new(tcp, arguments.known_as.clone(), tokens, &limits);
+        let mut closing = closing.clone();
+        let closed = async move {
+            // An error means the same: nobody is left who could close it.
+            let _ = closing.changed().await;
+        };
+        servers.spawn(http::serve(listener, access, limits, daemon.clone(), closed));
+        tracing::info!("listening on {address}");
+        println!("{address}");
+    }
+    notify(&[NotifyState::Ready]);
+    let signal = tokio::select! {
+        signal = ended => signal,
+        () = watchdog(daemon) => unreachable!("the watchdog is fed for ever"),
+    };
+    tracing::info!("{signal}: finishing the reading");
+    notify(&[NotifyState::Stopping]);
+    // Still served meanwhile: an emergency stop must get through until the arms are at rest.
+    daemon.shutdown().await;
+    drop(close);
+    while servers.join_next().await.is_some() {}
+    for address in &arguments.listen {
+        if let Address::Unix(path) = address {
+            // Whoever starts next would replace it.
+            let _ = fs::remove_file(path);
+        }
+    }
+    Ok(())
+}
+
+/// Text and name of the rig file.
+fn rig_file(named: Option<&Path>) -> anyhow::Result<(String, String)> {
+    let path = match named {
+        Some(path) => path,
+        None if Path::new(CONFIG).exists() => Path::new(CONFIG),
+        None => return Ok((RigFile::BUILT_IN.to_owned(), "built-in rig file".to_owned())),
+    };
+    let text =
+        fs::read_to_string(path).with_context(|| format!("cannot read the rig file {}", path.display()))?;
+    Ok((text, path.display().to_string()))
+}
+
+/// The tokens that are needed at an address.
+fn tokens(arguments: &Arguments, address: &Address) -> anyhow::Result<Option<Tokens>> {
+    let default = arguments.data.join("tokens.toml");
+    let path = match &arguments.tokens {
+        Some(path) => path,
+        None if address.is_local() => return Ok(None),
+        None => &default,
+    };
+    tracing::info!("{address} needs a token of {}", path.display());
+    Ok(Some(Tokens::open(path)?))
+}
+
+/// Returns which signal asked the daemon to end.
+fn terminated() -> anyhow::Result<impl Future<Output = &'static str>> {
+    let mut terminate = signal(SignalKind::terminate())?;
+    let mut interrupt = signal(SignalKind::interrupt())?;
+    Ok(async move {
+        tokio::select! {
+            _ = terminate.recv() => "SIGTERM",
+            _ = interrupt.recv() => "SIGINT",
+        }
+    })
+}
+
+/// Tells systemd that the daemon lives, as often as it wants to hear it, as long as the store answers.
+async fn watchdog(daemon: &Daemon) {
+    let Some(limit) = sd_notify::watchdog_enabled() else {
+        return std::future::pending().await;
+    };
+    let mut every = tokio::time::interval(limit / 3);
+    loop {
+        every.tick().await;
+        match tokio::time::timeout(limit / 3, daemon.jobs()).await {
+            Ok(_) => notify(&[NotifyState::Watchdog]),
+            Err(_) => tracing::error!("the store does not answer"),
+        }
+    }
+}
+
+fn notify(state: &[NotifyState<'_>]) {
+    if let Err(error) = sd_notify::notify(state) {
+        tracing::warn!("cannot tell systemd: {error}");
+    }
+}

@@ -1,0 +1,148 @@
+//! What the daemon says of itself.
+
+use std::path::Path;
+
+use crate::service::{JOB, Service};
+
+/// Set to write the committed document anew.
+const WRITE: &str = "GONIOD_WRITE_OPENAPI";
+
+#[test]
+fn the_committed_openapi_document_is_that_of_the_code() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("openapi.json");
+    let document = serde_json::to_string_pretty(&goniod::http::openapi()).unwrap() + "\n";
+    if std::env::var_os(WRITE).is_some() {
+        std::fs::write(&path, &document).unwrap();
+    }
+    let committed = std::fs::read_to_string(&path).unwrap_or_default();
+    let differs = document.lines().zip(committed.lines()).position(|(a, b)| a != b);
+    assert!(
+        document == committed,
+        "crates/goniod/openapi.json is not what the code serves, from line {}. If clients can live with the change, \
+         run\n\n    {WRITE}=1 cargo test -p goniod --test http openapi\n\nand commit the file.",
+        differs.map_or(committed.lines().count(), |line| line) + 1
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_served_document_is_the_committed_one() {
+    let service = Service::start().await;
+    let served = service.get("/api/v1/openapi.json").await;
+    assert_eq!(
+        served.json(),
+        serde_json::to_value(goniod::http::openapi()).unwrap()
+    );
+    service.end().await;
+}
+
+/// A job file in JSON is described by hand: whatever the shipped job files say must be in it.
+#[test]
+fn the_document_knows_every_key_of_the_shipped_job_files() {
+    let document = serde_json::to_value(goniod::http::openapi()).unwrap();
+    let schemas = &document["components"]["schemas"];
+    let jobs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/jobs");
+    for entry in std::fs::read_dir(jobs).unwrap() {
+        let path = entry.unwrap().path();
+        let job: toml::Table = std::fs::read_to_string(&path).unwrap().parse().unwrap();
+        for (key, value) in &job {
+            let about = &schemas["JobFile"]["properties"][key];
+            assert!(about.is_object(), "{}: the document lacks {key}", path.display());
+            let tables = value
+                .as_array()
+                .map_or_else(|| vec![value], |array| array.iter().collect());
+            let reference = about.pointer("/items/$ref").or(about.pointer("/$ref"));
+            let Some(name) = reference.and_then(|r| r.as_str()?.rsplit('/').next()) else {
+                continue;
+            };
+            for inner in tables
+                .into_iter()
+                .filter_map(toml::Value::as_table)
+                .flat_map(toml::Table::keys)
+            {
+                assert!(
+                    schemas[name]["properties"][inner].is_object(),
+                    "{}: the document lacks {key}.{inner}",
+                    path.display()
+                );
+            }
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn errors_are_problem_documents_that_say_what_is_allowed() {
+    let service = Service::start().await;
+    let toml = "Content-Type: application/toml\r\n";
+    let json = "Content-Type: application/json\r\n";
+    service.get("/nowhere").await.problem(404);
+    service
+        .get("/api/v1/jobs/01KAGN4Z7Q3X9V5T8R2M6C1D0B")
+        .await
+        .problem(404);
+    service.get("/api/v1/jobs/no-id").await.problem(404);
+    service.get("/api/v1/runs/no-id").await.problem(404);
+    service.ask("PUT", "/api/v1/rig", "", "").await.problem(405);
+    service
+        .ask("POST", "/api/v1/jobs", "Content-Type: text/plain\r\n", JOB)
+        .await
+        .problem(415);
+    let wrong = service
+        .ask(
+            "POST",
+            "/api/v1/jobs?name=a.toml",
+            toml,
+            "[[plane]]\ntheta_r_deg = 99\nreadings = 1\n",
+        )
+        .await;
+    let detail = wrong.problem(422);
+    for part in ["a.toml", "theta_r_deg", "0 … 85"] {
+        assert!(detail.contains(part), "{detail}");
+    }
+    service
+        .ask("POST", "/api/v1/jobs", json, "{\"plane\": null}")
+        .await
+        .problem(422);
+    service
+        .ask("POST", "/api/v1/jobs", json, "not json")
+        .await
+        .problem(422);
+    let far = service
+        .ask(
+            "POST",
+            "/api/v1/jog",
+            json,
+            "{\"arm\":\"light\",\"angle_deg\":90}",
+        )
+        .await;
+    assert!(far.problem(422).contains("-88.000° … 88.000°"), "{far:?}");
+    service
+        .ask("POST", "/api/v1/jog", json, "{\"arm\":\"third\",\"angle_deg\":0}")
+        .await
+        .problem(422);
+    service.post("/api/v1/pause").await.problem(409);
+    service.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_page_may_use_this_daemon_alone() {
+    let service = Service::start().await;
+    let page = service.get("/").await;
+    let policy = page.header("content-security-policy").unwrap();
+    assert!(
+        policy.contains("default-src 'none'") && policy.contains("frame-ancestors 'none'"),
+        "{policy}"
+    );
+    let text = String::from_utf8(page.body).unwrap();
+    for reference in text
+        .split(['"', '\''])
+        .filter(|part| part.starts_with("/assets/"))
+    {
+        let asset = service.get(reference).await;
+        assert_eq!(asset.status, 200, "{reference}");
+        assert_eq!(asset.header("x-content-type-options"), Some("nosniff"));
+        let known = format!("If-None-Match: {}\r\n", asset.header("etag").unwrap());
+        assert_eq!(service.ask("GET", reference, &known, "").await.status, 304);
+    }
+    assert!(!text.contains("http"), "nothing comes from elsewhere");
+    service.end().await;
+}
