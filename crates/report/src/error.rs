@@ -22,6 +22,17 @@ pub enum ReportError {
         /// The journal.
         path: PathBuf,
     },
+    /// The certificate of a standard is not what it may be.
+    #[error("{file}: {why}")]
+    Standard {
+        /// The file.
+        file: String,
+        /// What was found and what is allowed.
+        why: String,
+    },
+    /// The readings of a standard do not make a calibration.
+    #[error("no calibration")]
+    Calibration(#[source] rig::RigError),
     /// This version does not accept the run's job file.
     #[error("the job file in the journal")]
     Job(#[source] sweep::SweepError),

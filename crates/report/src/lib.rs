@@ -19,6 +19,7 @@ mod readings;
 mod report;
 mod run;
 mod slice;
+mod standard;
 
 pub use check::{Check, Verdict};
 pub use derive::model;
@@ -30,3 +31,4 @@ pub use preview::sphere;
 pub use readings::write_readings;
 pub use report::{Report, reconstruct, write};
 pub use run::{Given, Readings, Run, Seconds, State, flag_name};
+pub use standard::{Standard, WhiteReference};

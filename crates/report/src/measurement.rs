@@ -14,6 +14,8 @@ pub struct Measurement {
     pub reading: Reading,
     /// Where the arms really were, by what was measured and the certificate's alignment.
     pub pose: Pose,
+    /// Whether the arms shadowed each other there: planned around, so only where the alignment was not known before.
+    pub shadowed: bool,
     /// Zenith angle of the sensor there, rad.
     pub theta_r: f64,
     /// Signed deviation from the mirror direction there; positive towards the normal, negative outwards.
@@ -44,44 +46,54 @@ impl Measurement {
 ///
 /// The sensor is taken as the viewer at azimuth 0, on whichever side of the normal it stands.
 pub fn measurements(records: &[Record], rig: &RigFile) -> Vec<Measurement> {
-    let begun = records.iter().find_map(|record| match record {
-        Record::Begin { device_ticks, .. } => Some(*device_ticks),
-        _ => None,
-    });
-    let begun = begun.unwrap_or_default();
-    let readings = || {
-        records.iter().filter_map(|record| match record {
-            Record::Reading(reading) => Some(reading),
-            _ => None,
-        })
-    };
-    let time_s = |reading: &Reading| reading.device_ticks.saturating_sub(begun) as f64 * TICK_S;
-    let taken = |reading: &Reading| Taken {
-        pose: reading.measured,
-        time_s: time_s(reading),
-        lamp: reading.lamp,
-        counts: reading.counts,
-    };
-    let all: Vec<Taken> = readings().map(taken).collect();
-    let visits = readings().filter(|reading| reading.sweep == Sweep::Reference && reading.accepted);
-    let visits: Vec<Taken> = visits.map(taken).collect();
+    let readings = all_taken(records);
+    let all: Vec<Taken> = readings.iter().map(|(_, taken)| *taken).collect();
+    let visits = readings
+        .iter()
+        .filter(|(reading, _)| reading.sweep == Sweep::Reference && reading.accepted);
+    let visits: Vec<Taken> = visits.map(|(_, taken)| *taken).collect();
     let reduction = Reduction::new(rig, certificate(records), &all, &visits);
-    let measure = |(reading, taken): (&Reading, &Taken)| {
+    let measure = |(reading, taken): &(&Reading, Taken)| {
         let reflectance = reading.lamp.then(|| reduction.reflectance(taken));
         let good = reflectance.and_then(Result::ok);
         let pose = reduction.aligned(reading.measured);
         Measurement {
             pose,
+            shadowed: rig.envelope.occluded(pose),
             theta_r: pose.sensor.rad().abs(),
             deviation: pose.deviation() * 1_f64.copysign(pose.sensor.rad()),
             reflectance: reflectance.map(|result| result.map(|good| DVec3::from_array(good.rgb))),
             raw: good.map(|good| DVec3::from_array(good.raw)),
             budget: good.map(|good| good.u),
-            time_s: time_s(reading),
-            reading: reading.clone(),
+            time_s: taken.time_s,
+            reading: (*reading).clone(),
         }
     };
-    readings().zip(&all).map(measure).collect()
+    readings.iter().map(measure).collect()
+}
+
+/// Every reading of a journal, in its order, also as calibrations see it.
+pub(crate) fn all_taken(records: &[Record]) -> Vec<(&Reading, Taken)> {
+    let begun = records.iter().find_map(|record| match record {
+        Record::Begin { device_ticks, .. } => Some(*device_ticks),
+        _ => None,
+    });
+    let begun = begun.unwrap_or_default();
+    let readings = records.iter().filter_map(|record| match record {
+        Record::Reading(reading) => Some(reading),
+        _ => None,
+    });
+    readings
+        .map(|reading| {
+            let taken = Taken {
+                pose: reading.measured,
+                time_s: reading.device_ticks.saturating_sub(begun) as f64 * TICK_S,
+                lamp: reading.lamp,
+                counts: reading.counts,
+            };
+            (reading, taken)
+        })
+        .collect()
 }
 
 /// The stored calibration that holds for a run, from its journal.
@@ -92,11 +104,11 @@ pub(crate) fn certificate(records: &[Record]) -> Option<&Certificate> {
     }
 }
 
-/// What the accepted readings of one sweep observed.
+/// What the accepted readings of one sweep observed; those in shadow are left out.
 pub fn observations(measurements: &[Measurement], sweep: Sweep) -> Vec<Observation> {
     measurements
         .iter()
-        .filter(|m| m.reading.sweep == sweep && m.reading.accepted)
+        .filter(|m| m.reading.sweep == sweep && m.reading.accepted && !m.shadowed)
         .filter_map(|m| {
             Some(Observation {
                 theta_r: m.theta_r,

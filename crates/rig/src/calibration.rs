@@ -12,7 +12,7 @@ mod taken;
 #[cfg(test)]
 mod tests;
 
-pub use certificate::{Certificate, Colour, Conditions, Trap, White, Zero};
+pub use certificate::{Certificate, Colour, Conditions, Patch, Trap, White, Zero};
 pub use dark::{Dark, DarkCounts, Darks};
 pub use lamp::{Drift, Lamp};
 pub use measure::Certified;
@@ -59,6 +59,9 @@ pub enum Unusable {
     /// The monitor, or the visits to the reference pose, saw less than 1 % of the nominal lamp output.
     #[error("no light from the lamp was seen")]
     Lamp,
+    /// The monitor is at full scale: the lamp's output is only known to be larger.
+    #[error("the lamp monitor is at full scale: integration_max_us is too long for it")]
+    Monitor,
     /// No dark reading was taken at this gain.
     #[error("no dark reading at gain ×{}", u16::from(*.0))]
     Dark(Gain),

@@ -6,6 +6,8 @@ use serde::{Deserialize, Serialize};
 pub struct Mechanics {
     /// Limits and separation.
     pub envelope: Envelope,
+    /// How much further apart than the separation the arms must be for a reading, rad: so unsure are their angles.
+    pub margin_rad: f64,
     /// Profiles of light and sensor arm.
     pub profiles: [Profile; 2],
     /// Smallest step of each arm, rad.

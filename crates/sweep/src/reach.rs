@@ -1,4 +1,4 @@
-use arms::{Arm, Pose, Violation};
+use arms::{Arm, Envelope, Pose, Violation};
 
 use crate::Mechanics;
 use crate::route::overshoot;
@@ -43,7 +43,11 @@ impl<'a> Reach<'a> {
                 return Err(Hindrance::Limits(arm));
             }
         }
-        if envelope.occluded(pose) {
+        let wider = Envelope {
+            separation_rad: envelope.separation_rad + self.mechanics.margin_rad,
+            ..*envelope
+        };
+        if wider.occluded(pose) {
             return Err(Hindrance::Shadow);
         }
         if self.side != 0.0 && (pose.light - pose.sensor).signum() != self.side {

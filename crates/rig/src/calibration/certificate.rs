@@ -19,7 +19,10 @@ pub struct Certificate {
     pub trap: Option<Trap>,
     /// What a mirror said.
     pub zero: Option<Zero>,
-    /// What colour patches said.
+    /// Colour patches that were measured so far.
+    #[serde(default)]
+    pub patches: Vec<Patch>,
+    /// What they said, once there are enough of them.
     pub colour: Option<Colour>,
 }
 
@@ -76,6 +79,17 @@ pub struct Zero {
     pub offset_rad: f64,
     /// Its standard uncertainty, rad.
     pub u_rad: f64,
+}
+
+/// A colour patch as the sensor saw it and as it is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Patch {
+    /// Its name; a patch measured again takes the place of the one before.
+    pub name: String,
+    /// Reflectance factor in the sensor's own colours.
+    pub sensor: [f64; 3],
+    /// Reflectance factor in linear sRGB, as certified.
+    pub rgb: [f64; 3],
 }
 
 /// From the sensor's colours to linear sRGB.
@@ -142,6 +156,13 @@ impl Certificate {
             light: ArmAngle::from_rad(pose.light.rad() + offset),
             sensor: ArmAngle::from_rad(pose.sensor.rad() + offset),
         }
+    }
+
+    /// Standard uncertainty of an arm's zero, rad.
+    pub fn u_zero(&self, file: &RigFile) -> f64 {
+        self.zero
+            .as_ref()
+            .map_or(file.uncertainty.zero_rad, |zero| zero.u_rad)
     }
 
     /// When each part that it has was made, with its name.

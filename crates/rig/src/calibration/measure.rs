@@ -2,7 +2,7 @@
 
 use arms::Pose;
 
-use super::certificate::{Colour, Conditions, Trap, White, Zero};
+use super::certificate::{Certificate, Colour, Conditions, Patch, Trap, White, Zero};
 use super::reduction::Reduction;
 use super::{Filling, Taken};
 use crate::{Gain, RigError, RigFile};
@@ -16,8 +16,9 @@ pub struct Certified {
     pub reflectance_factor: [f64; 3],
 }
 
-/// Readings of a ladder that are within this share of full scale tell about linearity.
-const LADDER: std::ops::Range<f64> = 0.02..0.97;
+/// Readings of a ladder that are within this share of full scale tell about linearity; the weakest gain sees a white
+/// reference with a hundredth of full scale.
+const LADDER: std::ops::Range<f64> = 0.002..0.97;
 /// A mirror's lobe must be seen over at least so many readings.
 const MIN_LOBE: usize = 5;
 /// Share of the peak below which a reading of a mirror's lobe does not count: the centre of a lobe must not hang on
@@ -27,7 +28,8 @@ const LOBE_FOOT: f64 = 0.02;
 impl White {
     /// From readings of a white reference: at certified geometries, of which there may be one or a table, and a ladder
     /// of overlapping exposures at one pose. `u_reference` is the relative standard uncertainty of its certificate.
-    /// `readings` are all of the run in the order of their time, dark ones too; `trap` what a black trap said before.
+    /// `readings` are all of the run in the order of their time, dark ones too; `before` is what other
+    /// standards said.
     ///
     /// # Errors
     /// No usable reading at a certified geometry, or a ladder that says nothing.
@@ -37,20 +39,24 @@ impl White {
         ladder: &[Taken],
         certified: &[(Certified, Vec<Taken>)],
         u_reference: f64,
-        trap: Option<&Trap>,
+        before: &Certificate,
     ) -> Result<Self, RigError> {
         let nominal = Reduction::new(file, None, readings, &[]);
         let mut white = straightness(file, &nominal, ladder)?;
         let straight = nominal.with_white(white.clone());
         let mut found: Vec<[f64; 3]> = Vec::new();
+        let mut tilt: f64 = 0.0;
         for (at, taken) in certified {
             for taken in taken {
                 let Ok(rate) = straight.rate(taken) else { continue };
-                let stray = trap.map_or([0.0; 3], |trap| trap.at(taken.pose));
-                let cosine = match file.calibration.filling {
-                    Filling::Over => taken.pose.light.rad().cos(),
-                    Filling::Under => taken.pose.sensor.rad().cos(),
+                let pose = before.aligned(taken.pose);
+                let stray = before.trap.as_ref().map_or([0.0; 3], |trap| trap.at(pose));
+                let arm = match file.calibration.filling {
+                    Filling::Over => pose.light.rad(),
+                    Filling::Under => pose.sensor.rad(),
                 };
+                let cosine = arm.cos();
+                tilt = tilt.max(arm.tan().abs());
                 found.push(std::array::from_fn(|c| {
                     let f = at.reflectance_factor[c] / std::f64::consts::PI;
                     (rate.rgb[c] - stray[c]) / (f * cosine)
@@ -66,7 +72,7 @@ impl White {
         for c in 0..3 {
             let (mean, u) = mean(found.iter().map(|r| r[c]));
             white.responsivity[c] = mean;
-            white.u_responsivity[c] = (u / mean).hypot(u_reference);
+            white.u_responsivity[c] = (u / mean).hypot(u_reference).hypot(tilt * before.u_zero(file));
         }
         white.conditions.temperature_c = temperature_c(readings);
         Ok(white)
@@ -104,7 +110,7 @@ fn straightness(file: &RigFile, nominal: &Reduction<'_>, ladder: &[Taken]) -> Re
     if spread == 0.0 {
         return Err(RigError::Calibration {
             what: "ladder of exposures",
-            why: "no two of its readings at one gain lie between 2 % and 97 % of full scale".to_owned(),
+            why: "no two of its readings at one gain lie between 0.2 % and 97 % of full scale".to_owned(),
         });
     }
     let k = -common / spread;
@@ -141,12 +147,9 @@ impl Trap {
         file: &RigFile,
         readings: &[Taken],
         trap: &[Taken],
-        white: Option<&White>,
+        before: &Certificate,
     ) -> Result<Self, RigError> {
-        let mut reduction = Reduction::new(file, None, readings, &[]);
-        if let Some(white) = white {
-            reduction = reduction.with_white(white.clone());
-        }
+        let reduction = Reduction::new(file, Some(before), readings, &[]);
         let mut points = Vec::new();
         let mut variance = [0.0; 3];
         for taken in trap {
@@ -154,7 +157,7 @@ impl Trap {
             for (sum, u) in variance.iter_mut().zip(rate.u_counting) {
                 *sum += u * u;
             }
-            points.push((taken.pose, rate.rgb));
+            points.push((before.aligned(taken.pose), rate.rgb));
         }
         if points.is_empty() {
             return Err(RigError::Calibration {
@@ -238,12 +241,12 @@ impl Colour {
     ///
     /// # Errors
     /// Fewer than three patches, or patches that differ too little in colour.
-    pub fn measure(patches: &[([f64; 3], [f64; 3])]) -> Result<Self, RigError> {
-        let product = |a: usize, b: usize, of: &dyn Fn(&([f64; 3], [f64; 3]), usize) -> f64| -> f64 {
-            patches.iter().map(|patch| patch.0[a] * of(patch, b)).sum()
+    pub fn measure(patches: &[Patch]) -> Result<Self, RigError> {
+        let product = |a: usize, of: &dyn Fn(&Patch) -> f64| -> f64 {
+            patches.iter().map(|patch| patch.sensor[a] * of(patch)).sum()
         };
         let normal: [[f64; 3]; 3] =
-            std::array::from_fn(|a| std::array::from_fn(|b| product(a, b, &|patch, b| patch.0[b])));
+            std::array::from_fn(|a| std::array::from_fn(|b| product(a, &|patch| patch.sensor[b])));
         let inverse = inverse(&normal).ok_or_else(|| RigError::Calibration {
             what: "colour patches",
             why: format!(
@@ -252,19 +255,19 @@ impl Colour {
             ),
         })?;
         let matrix: [[f64; 3]; 3] = std::array::from_fn(|row| {
-            let right: [f64; 3] = std::array::from_fn(|a| product(a, row, &|patch, b| patch.1[b]));
+            let right: [f64; 3] = std::array::from_fn(|a| product(a, &|patch| patch.rgb[row]));
             std::array::from_fn(|a| (0..3).map(|b| inverse[a][b] * right[b]).sum())
         });
         let squares: f64 = patches
             .iter()
-            .flat_map(|(sensor, truth)| {
+            .flat_map(|patch| {
                 (0..3).map(move |row| {
-                    let said: f64 = (0..3).map(|a| matrix[row][a] * sensor[a]).sum();
-                    (said - truth[row]).powi(2)
+                    let said: f64 = (0..3).map(|a| matrix[row][a] * patch.sensor[a]).sum();
+                    (said - patch.rgb[row]).powi(2)
                 })
             })
             .sum();
-        let white = patches.iter().flat_map(|patch| patch.1).fold(0.0, f64::max);
+        let white = patches.iter().flat_map(|patch| patch.rgb).fold(0.0, f64::max);
         Ok(Self {
             conditions: Conditions::default(),
             matrix,

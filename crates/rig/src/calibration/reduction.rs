@@ -158,6 +158,9 @@ impl<'a> Reduction<'a> {
                 let (level, u) = self.drift.level(taken.time_s);
                 (level, 0.0, u / level)
             }
+            Lamp::Monitor if counts.monitor >= self.file.photometer.full_scale => {
+                return Err(Unusable::Monitor);
+            }
             Lamp::Monitor => {
                 let net = f64::from(counts.monitor) - dark.monitor;
                 let u = (known.variance(net, 1.0) + dark.u_monitor.powi(2)).sqrt();

@@ -102,6 +102,10 @@ fn what_says_nothing_is_refused() {
             Err(Unusable::Lamp)
         );
     }
+    assert_eq!(
+        at(pose, counts([8_000; 3], rig.photometer.full_scale, Gain::X1)),
+        Err(Unusable::Monitor)
+    );
     let one_gain = [taken(pose, false, counts([10; 3], 10, Gain::X1))];
     let other = counts([8_000; 3], 50_000, Gain::X256);
     assert_eq!(
@@ -177,13 +181,14 @@ fn a_ladder_tells_gains_and_linearity() {
         pose,
         reflectance_factor: [0.98; 3],
     };
+    let before = Certificate::default();
     let white = White::measure(
         &rig,
         &readings,
         &ladder,
         &[(certified, ladder.clone())],
         0.002,
-        None,
+        &before,
     )
     .unwrap();
     for (found, gain) in white.gains.into_iter().zip(gains) {
@@ -197,7 +202,7 @@ fn a_ladder_tells_gains_and_linearity() {
         white.responsivity
     );
     assert!(white.u_responsivity[0] >= 0.002);
-    assert!(White::measure(&rig, &readings, &ladder[..1], &[], 0.0, None).is_err());
+    assert!(White::measure(&rig, &readings, &ladder[..1], &[], 0.0, &Certificate::default()).is_err());
 }
 
 #[test]
@@ -241,14 +246,18 @@ fn a_colour_matrix_undoes_cross_talk() {
         ]
     };
     let patches = [[0.8, 0.1, 0.1], [0.1, 0.7, 0.2], [0.1, 0.1, 0.6], [0.9, 0.9, 0.9]];
-    let pairs = patches.map(|patch| (mixed(patch), patch));
-    let colour = Colour::measure(&pairs).unwrap();
+    let patches = patches.map(|rgb| Patch {
+        name: String::new(),
+        sensor: mixed(rgb),
+        rgb,
+    });
+    let colour = Colour::measure(&patches).unwrap();
     assert!(colour.residual < 1e-12, "{colour:?}");
     let sensor = mixed([0.3, 0.5, 0.2]);
     let red: f64 = (0..3).map(|a| colour.matrix[0][a] * sensor[a]).sum();
     assert!((red - 0.3).abs() < 1e-12);
     assert!(
-        Colour::measure(&[pairs[3], pairs[3], pairs[3]]).is_err(),
+        Colour::measure(&[3, 3, 3].map(|i: usize| patches[i].clone())).is_err(),
         "one colour thrice"
     );
 }

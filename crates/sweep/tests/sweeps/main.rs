@@ -28,6 +28,7 @@ fn mechanics() -> Mechanics {
             separation_rad: 5.0_f64.to_radians(),
             can_pass: false,
         },
+        margin_rad: 0.0,
         profiles: [profile; 2],
         resolution_rad: [TAU / 4096.0; 2],
         grid_rad: [0.0; 2],

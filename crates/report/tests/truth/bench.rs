@@ -1,0 +1,98 @@
+//! A simulated rig whose specimen can be changed, to calibrate and to measure.
+
+use std::sync::Arc;
+
+use brdf::Brdf;
+use capture::{Command, Header, Journal, JournalError, Outcome, Record};
+use firmware_sim::Bench;
+use firmware_sim::in_process::InProcessRig;
+use report::Standard;
+use rig::{Certificate, Drive, Rig, RigFile};
+use sweep::{Job, Plan};
+use tokio::sync::watch;
+
+/// Records in memory.
+struct Memory(Vec<Record>);
+
+impl Journal for Memory {
+    fn append(&mut self, record: &Record) -> Result<(), JournalError> {
+        self.0.push(record.clone());
+        Ok(())
+    }
+
+    fn records(&self) -> &[Record] {
+        &self.0
+    }
+}
+
+/// A rig with what was found out about it.
+pub(crate) struct Laboratory {
+    pub(crate) text: String,
+    pub(crate) file: RigFile,
+    pub(crate) certificate: Certificate,
+}
+
+impl Laboratory {
+    /// A rig of these lines, not calibrated.
+    pub(crate) fn new(text: &str) -> Self {
+        Self {
+            file: RigFile::parse(text, "test.toml".as_ref()).expect("a good rig file"),
+            text: text.to_owned(),
+            certificate: Certificate::default(),
+        }
+    }
+
+    /// Puts a standard on the stage and takes what it says into the certificate.
+    pub(crate) async fn calibrate(&mut self, standard: &Standard, specimen: Arc<dyn Brdf>) {
+        let visits = standard.visits(&self.file);
+        let records = self
+            .run(specimen, "", |mechanics| {
+                sweep::visits("calibration", &visits, mechanics)
+            })
+            .await;
+        let certified = standard.certify(&self.file, &records, &self.certificate);
+        self.certificate = certified.expect("a good standard");
+    }
+
+    /// Trap, mirror and white reference, in this order.
+    pub(crate) async fn calibrate_all(&mut self, white: &report::WhiteReference, on_stage: Arc<dyn Brdf>) {
+        for standard in [Standard::Mirror, Standard::Trap] {
+            let specimen = brdf::specimen(&standard.simulated().expect("known")).expect("known");
+            self.calibrate(&standard, specimen).await;
+        }
+        self.calibrate(&Standard::White(white.clone()), on_stage).await;
+    }
+
+    /// The records of a job on a specimen.
+    pub(crate) async fn measure(&self, specimen: Arc<dyn Brdf>, job: &str) -> Vec<Record> {
+        let parsed = Job::parse(job, "job.toml").expect("a good job");
+        self.run(specimen, job, |mechanics| sweep::plan(&parsed, mechanics))
+            .await
+    }
+
+    async fn run(
+        &self,
+        specimen: Arc<dyn Brdf>,
+        job: &str,
+        plan: impl FnOnce(&sweep::Mechanics) -> Result<Plan, sweep::SweepError>,
+    ) -> Vec<Record> {
+        let bench = Bench::with_specimen(&self.file, specimen).expect("a good [sim] table");
+        let mut rig = InProcessRig::over(bench, &self.file);
+        let start = rig.snapshot().await.expect("all devices answer").pose();
+        let plan = plan(&capture::mechanics(&self.file, Some(start))).expect("possible on this rig");
+        let mut journal = Memory(vec![Record::Header(Header {
+            run: "test".to_owned(),
+            version: "0".to_owned(),
+            job: job.to_owned(),
+            rig: self.text.clone(),
+            plan,
+            started: String::new(),
+            certificate: Some(self.certificate.clone()),
+        })]);
+        let (_operator, control) = watch::channel(Command::Run);
+        let mut drive = Drive::new(rig, self.file.clone());
+        let outcome = capture::run(&mut drive, &mut journal, control, &mut |_| ()).await;
+        assert_eq!(outcome.expect("the journal is sound"), Outcome::Done);
+        journal.0
+    }
+}

@@ -1,0 +1,4 @@
+//! Whole captures of known specimens on the simulated rig: what is reported must be true.
+
+mod absolute;
+mod bench;
