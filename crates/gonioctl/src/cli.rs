@@ -57,6 +57,8 @@ pub(crate) enum Command {
         #[command(flatten)]
         output: Output,
     },
+    /// Measure a standard that lies on the stage, and store what it says of the rig. The arms move.
+    Calibrate(CalibrateArguments),
     /// Make everything in a run directory again from its journal, or from the store of the daemon that captured it.
     Reconstruct {
         /// The run directory.
@@ -108,11 +110,50 @@ pub(crate) enum Command {
     },
 }
 
+/// What is calibrated with what.
+#[derive(Debug, Args)]
+pub(crate) struct CalibrateArguments {
+    #[command(subcommand)]
+    pub(crate) stage: OnStage,
+    #[command(flatten)]
+    pub(crate) rig: RigArgument,
+    /// What lies on the stage of the built-in simulator, where that is not what stands for the standard.
+    #[arg(long, global = true)]
+    pub(crate) specimen: Option<String>,
+    #[command(flatten)]
+    pub(crate) output: Output,
+}
+
+/// What lies on the stage. A mirror comes first, then the trap, then the white reference.
+#[derive(Debug, Subcommand)]
+pub(crate) enum OnStage {
+    /// A mirror: what is to be added to the arms' angles.
+    Mirror,
+    /// A black trap: stray light.
+    Trap,
+    /// A white reference: responsivity, gains, linearity.
+    White {
+        /// Its certificate: name, u_percent and [[at]] with light_deg, sensor_deg, reflectance_factor; 98 % ± 0.5 % at
+        /// 45°/0° unless given.
+        #[arg(long, value_name = "FILE.toml")]
+        standard: Option<PathBuf>,
+    },
+    /// A colour patch; with three or more the colour matrix.
+    Patch {
+        /// Its name; measured again, it takes the place of the one before.
+        #[arg(long)]
+        name: String,
+        /// Certified reflectance factor at 45°/0° in linear sRGB: red, green, blue.
+        #[arg(long, value_delimiter = ',', num_args = 3)]
+        rgb: Vec<f64>,
+    },
+}
+
 /// Which rig.
 #[derive(Debug, Args)]
 pub(crate) struct RigArgument {
     /// The rig file; config/rig.toml here unless given, else the built-in one.
-    #[arg(long, value_name = "RIG.toml")]
+    #[arg(long, value_name = "RIG.toml", global = true)]
     pub(crate) rig: Option<PathBuf>,
 }
 
@@ -120,7 +161,7 @@ pub(crate) struct RigArgument {
 #[derive(Clone, Copy, Debug, Args)]
 pub(crate) struct Output {
     /// Print JSON for machines.
-    #[arg(long)]
+    #[arg(long, global = true)]
     pub(crate) json: bool,
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Data goes to stdout, talk to stderr; the exit code says how it ended.
 
+mod calibrate;
 mod cli;
 mod doctor;
 mod eval;
@@ -69,6 +70,7 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             };
             return run::run(&task, output.json);
         }
+        Command::Calibrate(arguments) => return calibrate::calibrate(&arguments),
         Command::Export { run, format, to } => export::export(&run, format, to.as_deref())?,
         Command::Eval {
             truth,

@@ -51,7 +51,7 @@ pub(crate) fn run(task: &Task<'_>, json: bool) -> anyhow::Result<ExitCode> {
 }
 
 /// The first signal finishes the reading and holds, the second stops at once.
-async fn obey(mut signals: Signals, sender: watch::Sender<Command>) {
+pub(crate) async fn obey(mut signals: Signals, sender: watch::Sender<Command>) {
     let words = [
         (
             Command::Finish,

@@ -41,6 +41,14 @@ pub enum DaemonError {
         /// What is wrong in it.
         source: firmware_sim::SimError,
     },
+    /// The rig file asks for a stored calibration, and there is no valid one.
+    #[error("no valid calibration in {}: {why}", .directory.display())]
+    Uncertified {
+        /// Where they are looked for.
+        directory: PathBuf,
+        /// What is missing.
+        why: String,
+    },
     /// Run directories cannot be made there.
     #[error("cannot make run directories in {}", .path.display())]
     Out {

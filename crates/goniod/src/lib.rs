@@ -4,6 +4,8 @@
 //! through, and obeys an operator at once; [`http`] lets others use it. [`run`] carries out a single order without it. Front ends send commands
 //! and watch events; none of them drives.
 
+mod calibrate;
+mod certificates;
 mod daemon;
 mod error;
 mod event;
@@ -24,6 +26,8 @@ mod status;
 mod store;
 mod view;
 
+pub use calibrate::{Calibrated, Calibration};
+pub use certificates::Certificates;
 pub use daemon::{Daemon, Settings};
 pub use error::DaemonError;
 pub use event::{Event, Events, What};

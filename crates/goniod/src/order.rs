@@ -3,11 +3,12 @@ use std::time::SystemTime;
 
 use arms::Pose;
 use capture::Header;
-use rig::RigFile;
+use rig::{Certificate, RigFile};
 use sweep::{Job, Plan};
 use ulid::Ulid;
 
 use crate::DaemonError;
+use crate::certificates::Certificates;
 
 /// Where a rig file is looked for when none is named, seen from the working directory.
 const RIG_HERE: &str = "config/rig.toml";
@@ -64,16 +65,31 @@ impl Order {
     }
 
     /// First record of the journal of a run that begins now.
-    pub(crate) fn header(&self, plan: Plan, run: &Ulid, now: SystemTime) -> Header {
-        Header {
+    ///
+    /// # Errors
+    /// The rig file asks for a stored calibration and there is no valid one.
+    pub(crate) fn header(&self, plan: Plan, run: &Ulid, now: SystemTime) -> Result<Header, DaemonError> {
+        Ok(Header {
             run: run.to_string(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             job: self.job_text.clone(),
             rig: self.rig_text.clone(),
             plan,
             started: humantime::format_rfc3339_seconds(now).to_string(),
-            certificate: None,
-        }
+            certificate: self.certificate(now)?,
+        })
+    }
+
+    /// The stored calibration that holds for a run that begins now, where the rig file asks for one.
+    ///
+    /// # Errors
+    /// There is no valid one.
+    pub(crate) fn certificate(&self, now: SystemTime) -> Result<Option<Certificate>, DaemonError> {
+        let settings = &self.rig.certificates;
+        settings
+            .required
+            .then(|| Certificates::at(&settings.directory).valid(&self.rig, now))
+            .transpose()
     }
 
     /// What the order becomes on its rig, with the arms standing at `start`.

@@ -23,11 +23,7 @@ pub struct Ended {
 impl Ended {
     /// The exit status.
     pub fn status(&self) -> Status {
-        match self.outcome {
-            Outcome::Done => Status::Done,
-            Outcome::Stopped => Status::Stopped,
-            Outcome::Failed { .. } => Status::Rig,
-        }
+        Status::from(&self.outcome)
     }
 }
 
@@ -48,15 +44,16 @@ pub async fn run(
 ) -> Result<Ended, DaemonError> {
     // A job that this rig can never do need not wait for the rig to answer.
     order.plan(None)?;
+    let now = SystemTime::now();
+    order.certificate(now)?;
     prepare(out)?;
     let mut station = Station::open(&order.rig, &order.rig_name)?;
     let start = station.start().await?;
     let plan = order.plan(Some(start))?;
-    let now = SystemTime::now();
     let id = ulid::Ulid::generate();
+    let header = order.header(plan, &id, now)?;
     let directory = RunDirectory::at(out.join(name(now, &id)));
     fs::create_dir(directory.path()).map_err(unwritable(out))?;
-    let header = order.header(plan, &id, now);
     let mut journal = FileJournal::create(directory.journal(), header)?;
     finish(directory, &mut station, &mut journal, control, on_event).await
 }
@@ -113,7 +110,7 @@ pub(crate) fn prepare(out: &Path) -> Result<(), DaemonError> {
     tried.and(removed).map_err(unwritable(out))
 }
 
-fn unwritable(path: &Path) -> impl Fn(std::io::Error) -> DaemonError {
+pub(crate) fn unwritable(path: &Path) -> impl Fn(std::io::Error) -> DaemonError {
     move |source| DaemonError::Out {
         path: PathBuf::from(path),
         source,

@@ -1,3 +1,5 @@
+use capture::Outcome;
+
 /// How a command ended; its code is the exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
@@ -16,5 +18,15 @@ impl Status {
     /// The exit code.
     pub const fn code(self) -> u8 {
         self as u8
+    }
+}
+
+impl From<&Outcome> for Status {
+    fn from(outcome: &Outcome) -> Self {
+        match outcome {
+            Outcome::Done => Self::Done,
+            Outcome::Stopped => Self::Stopped,
+            Outcome::Failed { .. } => Self::Rig,
+        }
     }
 }

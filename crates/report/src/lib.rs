@@ -30,5 +30,5 @@ pub use picture::Picture;
 pub use preview::sphere;
 pub use readings::write_readings;
 pub use report::{Report, reconstruct, write};
-pub use run::{Given, Readings, Run, Seconds, State, flag_name};
+pub use run::{Given, Readings, Run, Seconds, State, Used, flag_name};
 pub use standard::{Standard, WhiteReference};

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 
 use capture::{Flag, Header, Outcome, Reading, Record};
-use rig::Identity;
+use rig::{Certificate, Conditions, Identity};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
@@ -53,6 +53,30 @@ impl Given {
     }
 }
 
+/// A stored calibration as a run names it; the journal holds it whole.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Used {
+    /// Its id.
+    pub id: String,
+    /// When it was made, RFC 3339.
+    pub made: String,
+    /// How each of its parts was made.
+    pub parts: BTreeMap<&'static str, Conditions>,
+}
+
+impl Used {
+    fn new(certificate: &Certificate) -> Self {
+        Self {
+            id: certificate.id.clone(),
+            made: certificate.made.clone(),
+            parts: certificate
+                .parts()
+                .map(|(name, conditions)| (name, conditions.clone()))
+                .collect(),
+        }
+    }
+}
+
 /// run.json: what was done, with what, and how it went; all of it from the journal.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Run {
@@ -70,6 +94,8 @@ pub struct Run {
     pub job: Given,
     /// The rig file.
     pub rig: Given,
+    /// The stored calibration that was used.
+    pub calibration: Option<Used>,
     /// Light servo, sensor servo, photometer, as they answered last.
     pub identities: Vec<Identity>,
     /// Wall clock at the start, RFC 3339.
@@ -183,6 +209,7 @@ impl Run {
             version: header.version.clone(),
             job: Given::new(&header.job),
             rig: Given::new(&header.rig),
+            calibration: header.certificate.as_ref().map(Used::new),
             identities: Vec::new(),
             started: header.started.clone(),
             ended: None,

@@ -205,7 +205,14 @@ impl Standard {
         let failed = ReportError::Calibration;
         let visits = of(Sweep::Reference);
         let mut certificate = before.clone();
+        let header = records.iter().find_map(|record| match record {
+            Record::Header(header) => Some((header.started.clone(), header.run.clone())),
+            _ => None,
+        });
+        let (made, run) = header.unwrap_or_default();
         let conditions = |of: Conditions| Conditions {
+            made: made.clone(),
+            run: run.clone(),
             standard: self.name().to_owned(),
             ..of
         };

@@ -86,7 +86,7 @@ impl Hand {
             planned: plan.steps.len() as u64,
             accepted: 0,
         };
-        let header = order.header(plan, &id, now);
+        let header = order.header(plan, &id, now)?;
         self.shared.store.begin_run(&run, &Record::Header(header)).await?;
         self.say(News::Begun { run: run.id.clone() });
         Ok(run.id)

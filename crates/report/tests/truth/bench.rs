@@ -14,8 +14,9 @@ use tokio::sync::watch;
 /// Records in memory.
 struct Memory(Vec<Record>);
 
+#[async_trait::async_trait]
 impl Journal for Memory {
-    fn append(&mut self, record: &Record) -> Result<(), JournalError> {
+    async fn append(&mut self, record: &Record) -> Result<(), JournalError> {
         self.0.push(record.clone());
         Ok(())
     }
