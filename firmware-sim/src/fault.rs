@@ -27,6 +27,8 @@ pub enum Disturbance {
     RefusedTrigger,
     /// The photometer's next write is carried out and not acknowledged.
     LostAcknowledgement,
+    /// The device's supply sags for a moment: it restarts, and its RAM is lost.
+    Reboot,
 }
 
 impl Disturbance {

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use registers as reg;
 
+use crate::Device;
 use crate::fault::{Disturbance, Schedule};
 use crate::lamp::Lamp;
 use crate::photodiodes::Exposed;
@@ -164,6 +165,7 @@ impl Photometer {
             }
             Disturbance::RefusedTrigger => self.refuses_trigger = true,
             Disturbance::LostAcknowledgement => self.loses_acknowledgement = true,
+            Disturbance::Reboot => self.reboot(),
             // A servo's.
             Disturbance::Stall(_) => {}
         }

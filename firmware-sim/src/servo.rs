@@ -12,6 +12,7 @@ pub(crate) use model::Model;
 use path::Path;
 use registers as reg;
 
+use crate::Device;
 use crate::fault::{Disturbance, Schedule};
 use crate::table::Table;
 
@@ -179,6 +180,7 @@ impl Servo {
                 let now_s = self.now.as_secs_f64();
                 self.shaft.jump(now_s, self.shaft.at(now_s).0);
             }
+            Disturbance::Reboot => self.reboot(),
             // The photometer's.
             Disturbance::RefusedTrigger | Disturbance::LostAcknowledgement => {}
         }

@@ -50,6 +50,7 @@ fn quickstart_fills_a_run_directory() {
     names.sort();
     let expected = [
         "brdf.binary",
+        "brdf.uncertainty.binary",
         "factors.csv",
         "journal",
         "preview.exr",

@@ -1,6 +1,6 @@
 use std::time::{Duration, SystemTime};
 
-use rig::{Counts, Drive, Exposure, Gain, Identity, Rig, RigFile};
+use rig::{Counts, Drive, Exposure, Gain, Identity, Lamp, Rig, RigFile};
 use sweep::{Plan, Step, Sweep};
 use tokio::sync::watch;
 
@@ -19,6 +19,8 @@ pub(crate) use shutdown::Interrupt;
 pub(crate) const MAX_EXPOSURES: u32 = 8;
 /// Longest time between two looks at a rig that waits, and at what the operator wants.
 const LOOK: Duration = Duration::from_millis(200);
+/// Share of its nominal output below which a lamp is out.
+const OUT: f64 = 0.01;
 /// Ticks of the photometer's clock per second.
 const TICKS_PER_S: f64 = 1e5;
 
@@ -178,6 +180,9 @@ impl<'a, R: Rig> Execution<'a, R> {
         let retries = self.drive.retries();
         let measured = self.travel_anew(before.goal).await?;
         let counts = self.drive.expose(before.counts.exposure).await?;
+        if self.lamp_is_out(&counts) {
+            return Err(Interrupt::Lamp);
+        }
         let mut reading = Reading {
             accepted: false,
             sweep: Sweep::Repeat,
@@ -222,6 +227,9 @@ impl<'a, R: Rig> Execution<'a, R> {
         let mut exposure = fixed.unwrap_or_else(|| self.ranging.first(step.sweep, step.pose()));
         for left in (0..MAX_EXPOSURES).rev() {
             let counts = self.drive.expose(exposure).await?;
+            if step.lamp && self.lamp_is_out(&counts) {
+                return Err(Interrupt::Lamp);
+            }
             let better = match fixed {
                 None if left > 0 => self.ranging.better(&counts),
                 _ => None,
@@ -267,6 +275,12 @@ impl<'a, R: Rig> Execution<'a, R> {
         let mechanics = mechanics(self.file, Some(from));
         let path = sweep::way(&mechanics, from, to).map_err(Interrupt::Way)?;
         Ok(self.drive.travel(&path).await?.pose())
+    }
+
+    /// Whether the monitor saw no light: a photometer that restarted on its own has its lamp off, and says so nowhere.
+    fn lamp_is_out(&self, counts: &Counts) -> bool {
+        let nominal = self.file.calibration.monitor * f64::from(counts.exposure.integration_us);
+        self.file.visits.lamp == Lamp::Monitor && f64::from(counts.monitor) < OUT * nominal
     }
 
     fn flags(&self, reading: &Reading) -> Vec<Flag> {

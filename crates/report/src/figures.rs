@@ -1,5 +1,6 @@
 use pdv::{Model, Observation};
 
+use crate::MonteCarlo;
 use crate::plot::{Axis, Mark, Series, svg};
 
 /// Decades of reflectance that a plot shows at most.
@@ -9,7 +10,12 @@ const LINE: u32 = 200;
 const CLASSES: [&str; 3] = ["r", "g", "b"];
 
 /// A plane: reflectance over d_p, both logarithmic; dots towards the normal, rings outwards, lines the model.
-pub(crate) fn plane(theta_r: f64, observations: &[Observation], model: Option<&dyn Model>) -> String {
+pub(crate) fn plane(
+    theta_r: f64,
+    observations: &[Observation],
+    model: Option<&dyn Model>,
+    draws: Option<&MonteCarlo>,
+) -> String {
     let of_side = |outwards: bool| {
         let side = observations
             .iter()
@@ -18,15 +24,15 @@ pub(crate) fn plane(theta_r: f64, observations: &[Observation], model: Option<&d
     };
     let x = Axis::around("d_p", Some(5), observations.iter().map(|o| o.deviation.abs()));
     let [low, high] = x.bounds;
-    let line = model.into_iter().flat_map(|model| {
-        (0..=LINE).filter_map(move |i| {
-            let d_p = low * (high / low).powf(f64::from(i) / f64::from(LINE));
-            let o = Observation::of(model, theta_r, d_p)?;
-            Some((d_p, o.rgb.to_array()))
-        })
+    let along = (0..=LINE).map(|i| {
+        let d_p = low * (high / low).powf(f64::from(i) / f64::from(LINE));
+        (d_p, theta_r, d_p)
     });
+    let [line, below, above] = band(along, model, draws);
     let series = [
-        series(Mark::Line, line.collect()),
+        line,
+        below,
+        above,
         series(Mark::Dot, of_side(false).collect()),
         series(Mark::Ring, of_side(true).collect()),
     ];
@@ -38,27 +44,53 @@ pub(crate) fn plane(theta_r: f64, observations: &[Observation], model: Option<&d
 }
 
 /// The arc: reflectance over θ_r, logarithmic; dots as measured, lines the model.
-pub(crate) fn arc(offset: f64, observations: &[Observation], model: Option<&dyn Model>) -> String {
+pub(crate) fn arc(
+    offset: f64,
+    observations: &[Observation],
+    model: Option<&dyn Model>,
+    draws: Option<&MonteCarlo>,
+) -> String {
     let x = Axis {
         label: "θ_r in degrees",
         log: false,
         bounds: [0.0, 90.0],
     };
-    let line = model.into_iter().flat_map(|model| {
-        (0..LINE).filter_map(move |i| {
-            let theta_r = std::f64::consts::FRAC_PI_2 * f64::from(i) / f64::from(LINE);
-            let o = Observation::of(model, theta_r, offset)?;
-            Some((theta_r.to_degrees(), o.rgb.to_array()))
-        })
+    let along = (0..LINE).map(|i| {
+        let theta_r = std::f64::consts::FRAC_PI_2 * f64::from(i) / f64::from(LINE);
+        (theta_r.to_degrees(), theta_r, offset)
     });
+    let [line, below, above] = band(along, model, draws);
     let dots = observations
         .iter()
         .map(|o| (o.theta_r.to_degrees(), o.rgb.to_array()));
-    let series = [
-        series(Mark::Line, line.collect()),
-        series(Mark::Dot, dots.collect()),
-    ];
+    let series = [line, below, above, series(Mark::Dot, dots.collect())];
     draw("Arc: reflectance over the mirror angle", &x, &series.concat())
+}
+
+/// The model along (x of the plot, θ_r, deviation), and the edges of its 95 % band.
+fn band(
+    along: impl Iterator<Item = (f64, f64, f64)>,
+    model: Option<&dyn Model>,
+    draws: Option<&MonteCarlo>,
+) -> [Vec<Series>; 3] {
+    let mut lines: [Vec<(f64, [f64; 3])>; 3] = Default::default();
+    for (x, theta_r, deviation) in along {
+        let Some(o) = model.and_then(|model| Observation::of(model, theta_r, deviation)) else {
+            continue;
+        };
+        lines[0].push((x, o.rgb.to_array()));
+        let said = |model: &dyn Model| Observation::of(model, theta_r, deviation).map(|o| o.rgb);
+        if let Some(u) = draws.and_then(|draws| draws.of(said)) {
+            lines[1].push((x, (o.rgb - u).to_array()));
+            lines[2].push((x, (o.rgb + u).to_array()));
+        }
+    }
+    let [line, below, above] = lines;
+    [
+        series(Mark::Line, line),
+        series(Mark::Edge, below),
+        series(Mark::Edge, above),
+    ]
 }
 
 /// One series per channel.
@@ -75,7 +107,9 @@ fn series(mark: Mark, points: Vec<(f64, [f64; 3])>) -> Vec<Series> {
 
 fn draw(title: &str, x: &Axis, series: &[Series]) -> String {
     // What was measured decides the range; a model may fall off to nothing.
-    let measured = series.iter().filter(|s| s.mark != Mark::Line);
+    let measured = series
+        .iter()
+        .filter(|s| !matches!(s.mark, Mark::Line | Mark::Edge));
     let values = measured.flat_map(|s| s.points.iter().map(|point| point.1));
     let y = Axis::around("reflectance in 1/sr", Some(DECADES), values);
     svg(title, x, &y, series)

@@ -6,6 +6,7 @@ use rig::{Budget, Certificate, Reduction, RigFile, Taken, Unusable};
 use sweep::Sweep;
 
 use crate::run::TICK_S;
+use crate::uncertainty::{Sensitivity, expand};
 
 /// A reading with what follows from it.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,6 +27,11 @@ pub struct Measurement {
     pub raw: Option<DVec3>,
     /// How sure the reflectance is, as far as this reading can tell.
     pub budget: Option<Budget>,
+    /// Expanded uncertainty of the reflectance, k = 2, sr⁻¹: all that is in the budget, the arms' angles and the
+    /// apertures.
+    pub u: Option<DVec3>,
+    /// How the reflectance depends on the angles here.
+    pub(crate) sensitivity: Sensitivity,
     /// Rig time since the start of the run, s.
     pub time_s: f64,
 }
@@ -65,11 +71,15 @@ pub fn measurements(records: &[Record], rig: &RigFile) -> Vec<Measurement> {
             reflectance: reflectance.map(|result| result.map(|good| DVec3::from_array(good.rgb))),
             raw: good.map(|good| DVec3::from_array(good.raw)),
             budget: good.map(|good| good.u),
+            u: None,
+            sensitivity: Sensitivity::default(),
             time_s: taken.time_s,
             reading: (*reading).clone(),
         }
     };
-    readings.iter().map(measure).collect()
+    let mut measurements: Vec<Measurement> = readings.iter().map(measure).collect();
+    expand(&mut measurements, records, rig);
+    measurements
 }
 
 /// Every reading of a journal, in its order, also as calibrations see it.

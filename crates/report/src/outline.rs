@@ -5,7 +5,7 @@ use sweep::Job;
 use crate::derive::Sweeps;
 use crate::page::Page;
 use crate::run::State;
-use crate::{Report, figures, preview};
+use crate::{MonteCarlo, Report, figures, preview};
 
 /// What report.html shows of a run.
 pub(crate) fn page<'a>(
@@ -14,6 +14,7 @@ pub(crate) fn page<'a>(
     sweeps: &Sweeps,
     model: Option<&dyn Model>,
     truth: Option<&dyn Brdf>,
+    draws: Option<&MonteCarlo>,
 ) -> Page<'a> {
     let mut pictures = Vec::new();
     let spheres: [(&str, Option<&dyn Brdf>); 2] = [
@@ -28,14 +29,14 @@ pub(crate) fn page<'a>(
     let mut plots = Vec::new();
     for (plane, observations) in job.planes.iter().zip(&sweeps.planes) {
         plots.push((
-            "G: dots towards the normal, rings outwards, lines the model. Both axes logarithmic.",
-            figures::plane(plane.theta_r, observations, model),
+            "G: dots towards the normal, rings outwards, lines the model, dashed its 95 % band. Both axes logarithmic.",
+            figures::plane(plane.theta_r, observations, model, draws),
         ));
     }
     if let Some(arc) = &job.arc {
         plots.push((
-            "F: the mirror arc, dots as measured, lines the model.",
-            figures::arc(arc.offset, &sweeps.arc, model),
+            "F: the mirror arc, dots as measured, lines the model, dashed its 95 % band.",
+            figures::arc(arc.offset, &sweeps.arc, model, draws),
         ));
     }
     let mut tables = Vec::new();

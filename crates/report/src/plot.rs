@@ -24,6 +24,8 @@ pub(crate) struct Axis {
 pub(crate) enum Mark {
     /// A polyline.
     Line,
+    /// A thin dashed one: an edge of what a line may be.
+    Edge,
     /// Filled dots.
     Dot,
     /// Rings.
@@ -165,10 +167,11 @@ pub(crate) fn svg(title: &str, x: &Axis, y: &Axis, series: &[Series]) -> String 
         let placed = points
             .iter()
             .filter_map(|&(vx, vy)| Some(((px(x.place(vx)?), py(y.place(vy)?)), (vx, vy))));
-        if *mark == Mark::Line {
+        if matches!(mark, Mark::Line | Mark::Edge) {
+            let edge = if *mark == Mark::Edge { " edge" } else { "" };
             let path: Vec<String> = placed.map(|((px, py), _)| format!("{px:.1} {py:.1}")).collect();
             line(format_args!(
-                "<polyline class=\"{class}\" points=\"{}\"/>",
+                "<polyline class=\"{class}{edge}\" points=\"{}\"/>",
                 path.join(" ")
             ));
             continue;

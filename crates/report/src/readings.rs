@@ -32,6 +32,13 @@ struct Row {
     attempt: u32,
     accepted: bool,
     retries: u32,
+    u_r: Option<f64>,
+    u_g: Option<f64>,
+    u_b: Option<f64>,
+    raw_r: Option<f64>,
+    raw_g: Option<f64>,
+    raw_b: Option<f64>,
+    shadowed: bool,
 }
 
 impl Row {
@@ -64,12 +71,20 @@ impl Row {
             attempt: reading.attempt,
             accepted: reading.accepted,
             retries: reading.retries,
+            u_r: measurement.u.map(|u| u.x),
+            u_g: measurement.u.map(|u| u.y),
+            u_b: measurement.u.map(|u| u.z),
+            raw_r: measurement.raw.map(|f| f.x),
+            raw_g: measurement.raw.map(|f| f.y),
+            raw_b: measurement.raw.map(|f| f.z),
+            shadowed: measurement.shadowed,
         }
     }
 }
 
 /// Writes readings.csv: one row a reading, in the order in which they were taken; reflectance in sr⁻¹, empty where a
-/// reading has none (lamp off, saturated).
+/// reading has none (lamp off, saturated). `u` is the expanded uncertainty, k = 2; `raw` the reflectance in the sensor's
+/// own colours.
 ///
 /// # Errors
 /// The medium refused.

@@ -9,7 +9,8 @@ use sweep::{Job, LeftOut};
 
 use crate::derive::{Sweeps, truth};
 use crate::{
-    Check, ReportError, Run, RunDirectory, checks, measurements, outline, preview, slice, write_readings,
+    Check, MonteCarlo, ReportError, Run, RunDirectory, checks, measurements, outline, preview, slice,
+    write_readings,
 };
 
 /// report.json: how far the result can be trusted.
@@ -69,8 +70,11 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
         Ok(model) => (Some(model), None),
         Err(why) => (None, Some(why)),
     };
-    if let Some(model) = &model {
-        write_model(directory, model.as_ref())?;
+    let draws = model
+        .as_ref()
+        .map(|_| MonteCarlo::new(&job, &measurements, records, &rig));
+    if let (Some(model), Some(draws)) = (&model, &draws) {
+        write_model(directory, model.as_ref(), draws)?;
     }
     let errors = model.as_ref().zip(truth.as_ref()).map(|(model, truth)| {
         let estimate: &dyn Brdf = model.as_ref();
@@ -86,15 +90,25 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
         run,
     };
     directory.write("report.json", |file| json(file, &report))?;
-    let page = outline::page(&report, &job, &sweeps, model.as_deref(), truth.as_deref());
+    let page = outline::page(
+        &report,
+        &job,
+        &sweeps,
+        model.as_deref(),
+        truth.as_deref(),
+        draws.as_ref(),
+    );
     directory.write("report.html", |file| file.write_all(page.html().as_bytes()))?;
     Ok(report)
 }
 
-/// factors.csv, brdf.binary, slice.exr, preview.exr and preview.png.
-fn write_model(directory: &RunDirectory, model: &dyn Model) -> Result<(), ReportError> {
-    directory.write("factors.csv", |file| write_factors(model, file))?;
+/// factors.csv, brdf.binary and its uncertainty, slice.exr, preview.exr and preview.png.
+fn write_model(directory: &RunDirectory, model: &dyn Model, draws: &MonteCarlo) -> Result<(), ReportError> {
+    directory.write("factors.csv", |file| write_factors(model, draws, file))?;
     directory.write("brdf.binary", |file| MerlTable::fill(model).write_to(file))?;
+    directory.write("brdf.uncertainty.binary", |file| {
+        MerlTable::fill(draws).write_to(file)
+    })?;
     directory.write("slice.exr", |file| slice::write(model, file))?;
     let sphere = preview::sphere(model);
     directory.write("preview.exr", |file| sphere.write_exr(file, &preview::ATTRIBUTES))?;
@@ -103,13 +117,18 @@ fn write_model(directory: &RunDirectory, model: &dyn Model) -> Result<(), Report
     })
 }
 
-/// One row a node: factor, its variable with the unit, the variable, red, green, blue.
-fn write_factors(model: &dyn Model, out: impl Write) -> io::Result<()> {
+/// One row a node: factor, its variable with the unit, the variable, red, green, blue, and their expanded
+/// uncertainties, k = 2.
+fn write_factors(model: &dyn Model, draws: &MonteCarlo, out: impl Write) -> io::Result<()> {
     let mut writer = csv::Writer::from_writer(out);
-    writer.write_record(["factor", "variable", "value", "r", "g", "b"])?;
-    for table in model.factors() {
-        for (value, rgb) in &table.rows {
-            writer.serialize((table.name, table.variable, value, rgb.x, rgb.y, rgb.z))?;
+    writer.write_record(["factor", "variable", "value", "r", "g", "b", "u_r", "u_g", "u_b"])?;
+    let tables = model.factors();
+    let uncertainties = draws.factors(&tables);
+    for (t, table) in tables.iter().enumerate() {
+        for (r, (value, rgb)) in table.rows.iter().enumerate() {
+            let u = uncertainties.as_ref().map(|u| u[t][r]);
+            let u = [u.map(|u| u.x), u.map(|u| u.y), u.map(|u| u.z)];
+            writer.serialize((table.name, table.variable, value, rgb.to_array(), u))?;
         }
     }
     writer.flush()

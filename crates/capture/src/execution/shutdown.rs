@@ -4,6 +4,9 @@ use sweep::SweepError;
 use super::{Execution, now};
 use crate::{CaptureError, Event, JournalError, Outcome, Record};
 
+const LAMP_OUT: &str =
+    "the lamp is out although it was switched on: the photometer has restarted, or the lamp has failed";
+
 /// Why an execution ends before its last step.
 #[derive(Debug)]
 pub(crate) enum Interrupt<E: rig::Fault> {
@@ -14,6 +17,8 @@ pub(crate) enum Interrupt<E: rig::Fault> {
     Estop,
     Fault(DriveError<E>),
     Way(SweepError),
+    /// The lamp is out although it was switched on.
+    Lamp,
     Refused(CaptureError),
 }
 
@@ -37,6 +42,9 @@ impl<R: Rig> Execution<'_, R> {
     ) -> Result<Outcome, CaptureError> {
         match &result {
             Err(Interrupt::Fault(error)) => self.tell_fault(error.kind(), error.device(), chain(error)),
+            Err(Interrupt::Lamp) => {
+                self.tell_fault(FaultKind::Hardware, Some(Device::Photometer), LAMP_OUT.to_owned());
+            }
             Err(Interrupt::Way(error)) => self.tell_fault(FaultKind::Refused, None, chain(error)),
             _ => {}
         }
@@ -62,6 +70,9 @@ impl<R: Rig> Execution<'_, R> {
             },
             Err(Interrupt::Fault(fault)) => Outcome::Failed { fault: chain(&fault) },
             Err(Interrupt::Way(error)) => Outcome::Failed { fault: chain(&error) },
+            Err(Interrupt::Lamp) => Outcome::Failed {
+                fault: LAMP_OUT.to_owned(),
+            },
             Err(Interrupt::Refused(error)) => return Err(error),
         };
         // A fault or an emergency stop is worse news than what went wrong after it.

@@ -2,3 +2,4 @@
 
 mod absolute;
 mod bench;
+mod coverage;

@@ -1,0 +1,165 @@
+use brdf::Brdf;
+use glam::DVec3;
+use pdv::{FactorTable, Model, Observation};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rig::RigFile;
+use sweep::{Job, Sweep};
+
+use crate::uncertainty::{COVERAGE, angles};
+use crate::{Measurement, model};
+
+/// Draws: the standard deviation over them is known to 13 %.
+const DRAWS: usize = 32;
+/// Draws that a table is made of, which takes a million evaluations of each: known to 18 %.
+const TABLE_DRAWS: usize = 16;
+/// Seed, so that a run says the same whenever it is reported.
+const SEED: u64 = 0x676f_6e69_6f64;
+
+/// The reconstruction made again of readings that differ from the measured ones as they may be wrong: what a result's
+/// spread over these models is, is its uncertainty.
+///
+/// What is common to readings stays common: responsivity, linearity, stray light and the zeros of the arms are drawn once a
+/// draw, the lamp and the dark level once for each sweep; counting noise and an arm's angle in each reading for themselves.
+pub struct MonteCarlo {
+    models: Vec<Box<dyn Model>>,
+}
+
+impl MonteCarlo {
+    /// Draws of a job's measurements. Empty where no model can be made of them.
+    pub fn new(job: &Job, measurements: &[Measurement], records: &[capture::Record], rig: &RigFile) -> Self {
+        let mut random = ChaCha8Rng::seed_from_u64(SEED);
+        let [angle, zero] = angles(records, rig);
+        let draw = |_| {
+            let common = Common::draw(&mut random, zero);
+            let mut sweep = |sweep: Sweep| -> Vec<Observation> {
+                let of_sweep: [DVec3; 2] = [normal3(&mut random), normal3(&mut random)];
+                let used = measurements
+                    .iter()
+                    .filter(|m| m.reading.sweep == sweep && m.reading.accepted && !m.shadowed);
+                used.filter_map(|m| {
+                    let rgb = m.rgb()? + common.error(m, of_sweep, angle, &mut random)?;
+                    Some(Observation {
+                        theta_r: m.theta_r,
+                        deviation: m.deviation,
+                        rgb,
+                    })
+                })
+                .collect()
+            };
+            let planes: Vec<_> = (0..job.planes.len()).map(|i| sweep(Sweep::Plane(i))).collect();
+            let arc = sweep(Sweep::Arc);
+            model(job.model, &planes, &arc).ok()
+        };
+        Self {
+            models: (0..DRAWS).filter_map(draw).collect(),
+        }
+    }
+
+    /// Expanded uncertainty, k = 2, of every row of a model's factors; `None` where a draw has other rows.
+    pub fn factors(&self, of: &[FactorTable]) -> Option<Vec<Vec<DVec3>>> {
+        let draws: Vec<Vec<FactorTable>> = self.models.iter().map(|model| model.factors()).collect();
+        let table = |t: usize| {
+            let row = |r: usize| {
+                let values: Option<Vec<DVec3>> = draws
+                    .iter()
+                    .map(|draw| Some(draw.get(t)?.rows.get(r)?.1))
+                    .collect();
+                values.map(|values| expanded(&values))
+            };
+            (0..of[t].rows.len()).map(row).collect::<Option<Vec<DVec3>>>()
+        };
+        (0..of.len()).map(table).collect()
+    }
+
+    /// Expanded uncertainty, k = 2, of what a model says of something; `None` where a draw says nothing.
+    pub fn of(&self, value: impl Fn(&dyn Model) -> Option<DVec3>) -> Option<DVec3> {
+        let values: Option<Vec<DVec3>> = self.models.iter().map(|model| value(model.as_ref())).collect();
+        values.map(|values| expanded(&values))
+    }
+}
+
+/// As a table of uncertainties, of the first half of the draws.
+impl Brdf for MonteCarlo {
+    fn eval(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
+        let draws = self.models.iter().take(TABLE_DRAWS);
+        let (mut n, mut mean, mut squares) = (0.0, DVec3::ZERO, DVec3::ZERO);
+        // Welford's: a million times, without a list.
+        for model in draws {
+            n += 1.0;
+            let value = model.eval(incident, exitant);
+            let off = value - mean;
+            mean += off / n;
+            squares += off * (value - mean);
+        }
+        let variance = squares / f64::max(n - 1.0, 1.0);
+        COVERAGE * DVec3::from_array(variance.to_array().map(|v| v.max(0.0).sqrt()))
+    }
+}
+
+/// What all readings of a draw share, in standard uncertainties.
+struct Common {
+    reference: DVec3,
+    linearity: f64,
+    stray: f64,
+    aperture: f64,
+    /// Rad.
+    zeros: [f64; 2],
+}
+
+impl Common {
+    fn draw(random: &mut ChaCha8Rng, zero: f64) -> Self {
+        Self {
+            // A reference is as wrong in one colour as in the others, more or less.
+            reference: DVec3::splat(normal(random)),
+            linearity: normal(random),
+            stray: normal(random),
+            aperture: normal(random),
+            zeros: [zero * normal(random), zero * normal(random)],
+        }
+    }
+
+    /// By how much a reading is off.
+    fn error(
+        &self,
+        m: &Measurement,
+        [dark, drift]: [DVec3; 2],
+        angle: f64,
+        random: &mut ChaCha8Rng,
+    ) -> Option<DVec3> {
+        let budget = m.budget?;
+        let u = DVec3::from_array;
+        let [light, sensor] = self.zeros.map(|zero| zero + angle * normal(random));
+        Some(
+            u(budget.counting) * normal3(random)
+                + u(budget.dark) * dark
+                + u(budget.drift) * drift
+                + u(budget.reference) * self.reference
+                + u(budget.linearity) * self.linearity
+                + u(budget.stray) * self.stray
+                + m.sensitivity.arms[0] * light
+                + m.sensitivity.arms[1] * sensor
+                + m.sensitivity.aperture * self.aperture,
+        )
+    }
+}
+
+fn normal(random: &mut ChaCha8Rng) -> f64 {
+    StandardNormal.sample(random)
+}
+
+fn normal3(random: &mut ChaCha8Rng) -> DVec3 {
+    DVec3::new(normal(random), normal(random), normal(random))
+}
+
+/// k times the standard deviation; 0 of fewer than two values.
+fn expanded(values: &[DVec3]) -> DVec3 {
+    let n = values.len() as f64;
+    if n < 2.0 {
+        return DVec3::ZERO;
+    }
+    let mean = values.iter().sum::<DVec3>() / n;
+    let squares: DVec3 = values.iter().map(|value| (*value - mean) * (*value - mean)).sum();
+    COVERAGE * DVec3::from_array((squares / (n - 1.0)).to_array().map(f64::sqrt))
+}
