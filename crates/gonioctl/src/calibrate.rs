@@ -9,7 +9,8 @@ use tokio::sync::watch;
 
 use crate::cli::{CalibrateArguments, OnStage};
 use crate::progress::Progress;
-use crate::run::{Signals, obey};
+use crate::run::obey;
+use crate::signals::Signals;
 use crate::{exit, print};
 
 /// Takes the readings of a standard and stores what they say.
