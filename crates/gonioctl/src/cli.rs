@@ -86,14 +86,16 @@ pub(crate) enum Command {
         #[command(flatten)]
         output: Output,
     },
-    /// Judge the reconstruction over many materials without a rig: the paper's evaluation unless a file says otherwise.
+    /// Error against run time, over materials, plans and models on the simulated rig; or what a study file asks for.
+    ///
+    /// A study that was interrupted goes on where it stopped.
     Study {
-        /// The study file; the built-in one unless given.
+        /// The study file; the built-in config/studies/error-against-time.toml unless given.
         study: Option<PathBuf>,
-        /// A hundredth of it, in seconds.
+        /// A small part of it, within a minute.
         #[arg(long)]
         quick: bool,
-        /// Where to write study.csv and summary.json; rows go to stdout unless given.
+        /// Where rows, plots and the page are written; studies/NAME unless given.
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },

@@ -77,7 +77,7 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             estimate,
             output,
         } => eval::eval(&truth, &estimate, output.json)?,
-        Command::Study { study, quick, out } => study::study(study.as_deref(), quick, out.as_deref())?,
+        Command::Study { study, quick, out } => study::study(study.as_deref(), quick, out)?,
         Command::Completions { shell } => manual::completions(shell)?,
         Command::Man { directory } => manual::man(&directory)?,
         Command::Reconstruct { run, output } => reconstruct::reconstruct(run, output.json)?,

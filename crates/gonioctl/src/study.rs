@@ -1,23 +1,46 @@
-use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
+use ::study::Study;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::print;
 
-/// Runs a study: rows to a directory or to stdout, the summary to stderr.
+/// Runs a study into a directory, which is printed; what was found goes to stderr.
 ///
 /// # Errors
 /// The study file is wrong, or the results cannot be written.
-pub(crate) fn study(file: Option<&Path>, quick: bool, out: Option<&Path>) -> anyhow::Result<()> {
-    let style = ProgressStyle::with_template("[{bar:30}] {pos}/{len} materials, {eta} left")?;
+pub(crate) fn study(file: Option<&Path>, quick: bool, out: Option<PathBuf>) -> anyhow::Result<()> {
+    let study = Study::read(file, quick)?;
+    let directory = out.unwrap_or_else(|| Path::new("studies").join(name(file, quick)));
+    let style = ProgressStyle::with_template("[{bar:30}] {percent} %, {elapsed} taken, {eta} left")?;
     let bar = ProgressBar::new(0).with_style(style.progress_chars("=> "));
-    let progress = |done: usize, of: usize| {
-        bar.set_length(of as u64);
-        bar.set_position(done as u64);
-    };
-    let summary = ::study::main_like(file, quick, out, io::stdout().lock(), progress)?;
+    let printed = Mutex::new(0);
+    let found = study.run(&directory, &|done, of| {
+        bar.set_length(of);
+        bar.set_position(done);
+        // Without a terminal, a line for every tenth.
+        let tenth = 10 * done / of.max(1);
+        let mut printed = printed.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if bar.is_hidden() && tenth > *printed {
+            *printed = tenth;
+            let left = bar.eta().as_secs();
+            print::say(format_args!("{} %, {left} s left", 10 * tenth));
+        }
+    })?;
     bar.finish_and_clear();
-    print::say(summary);
+    print::say(found);
+    print::line(directory.display())?;
     Ok(())
+}
+
+/// Of the directory, where none is named.
+fn name(file: Option<&Path>, quick: bool) -> String {
+    let stem = file.and_then(Path::file_stem).map(|stem| stem.to_string_lossy());
+    let stem = stem.unwrap_or("error-against-time".into());
+    if quick {
+        format!("{stem}-quick")
+    } else {
+        stem.into_owned()
+    }
 }

@@ -30,7 +30,7 @@ pub use error::{ReportError, is_full};
 pub use measurement::{Measurement, measurements, observations};
 pub use monte_carlo::MonteCarlo;
 pub use picture::Picture;
-pub use preview::sphere;
+pub use preview::{EXPOSURE as SPHERE_EXPOSURE, sphere};
 pub use readings::write_readings;
 pub use report::{Report, reconstruct, write};
 pub use run::{Given, Readings, Run, Seconds, State, Used, flag_name};

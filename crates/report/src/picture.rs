@@ -73,18 +73,21 @@ impl Picture {
             })
     }
 
-    /// The picture as an 8-bit sRGB PNG. Tone map: each channel c becomes 1 − exp(−`exposure`·c), then the sRGB
-    /// transfer curve.
+    /// 8-bit sRGB, three bytes a pixel. Tone map: each channel c becomes 1 − exp(−`exposure`·c), then the sRGB transfer
+    /// curve.
+    pub fn tone_mapped(&self, exposure: f64) -> Vec<u8> {
+        let channels = self.pixels.iter().flat_map(DVec3::to_array);
+        channels
+            .map(|c| (srgb(-(-exposure * c.max(0.0)).exp_m1()) * 255.0).round() as u8)
+            .collect()
+    }
+
+    /// The picture as an 8-bit sRGB PNG, tone mapped as by [`Picture::tone_mapped`].
     ///
     /// # Errors
     /// None but those of the encoder, which a picture of at least one pixel does not cause.
     pub fn png(&self, exposure: f64) -> io::Result<Vec<u8>> {
-        let bytes: Vec<u8> = self
-            .pixels
-            .iter()
-            .flat_map(DVec3::to_array)
-            .map(|c| (srgb(-(-exposure * c.max(0.0)).exp_m1()) * 255.0).round() as u8)
-            .collect();
+        let bytes = self.tone_mapped(exposure);
         let mut out = Vec::new();
         let side = |n: usize| u32::try_from(n).map_err(io::Error::other);
         let mut encoder = png::Encoder::new(&mut out, side(self.width)?, side(self.height())?);

@@ -37,7 +37,7 @@ pub(crate) const ATTRIBUTES: [(&str, &str); 2] = [
 ];
 
 /// The exposure that a preview is shown with: the key light on a white diffuser facing it becomes 1 − exp(−1.5).
-pub(crate) const EXPOSURE: f64 = 1.5 * std::f64::consts::PI / LAMPS[0].1;
+pub const EXPOSURE: f64 = 1.5 * std::f64::consts::PI / LAMPS[0].1;
 
 /// Radiance towards the viewer at (x, y) of the unit disk.
 fn radiance(material: &(impl Brdf + ?Sized), x: f64, y: f64) -> DVec3 {

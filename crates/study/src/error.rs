@@ -45,6 +45,40 @@ pub enum Error {
         /// Which material, and what is near it.
         source: brdf::Error,
     },
+    /// A directory is in use for something else.
+    #[error("{directory} holds another study; name another directory")]
+    OtherStudy {
+        /// Which directory.
+        directory: PathBuf,
+    },
+    /// A plot could not be drawn.
+    #[error("cannot draw \"{title}\": {why}")]
+    Plot {
+        /// Its title.
+        title: String,
+        /// What the drawing library says.
+        why: String,
+    },
+    /// The rig file is wrong.
+    #[error(transparent)]
+    Rig(#[from] Box<rig::RigError>),
+    /// The simulated rig of a rig file cannot be.
+    #[error("the simulated rig")]
+    Sim {
+        /// Why.
+        source: firmware_sim::SimError,
+    },
+    /// A job cannot be planned on the rig.
+    #[error(transparent)]
+    Plan(#[from] sweep::SweepError),
+    /// A simulated capture did not reach its end.
+    #[error("{job}: the simulated capture failed: {why}")]
+    Capture {
+        /// Which job.
+        job: String,
+        /// Why, in words.
+        why: String,
+    },
     /// A material could not be reconstructed.
     #[error("{material} at {theta_r_deg}° cannot be reconstructed")]
     Model {
@@ -55,4 +89,10 @@ pub enum Error {
         /// Why.
         source: pdv::Error,
     },
+}
+
+impl From<rig::RigError> for Error {
+    fn from(error: rig::RigError) -> Self {
+        Self::Rig(Box::new(error))
+    }
 }

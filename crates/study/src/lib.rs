@@ -1,18 +1,30 @@
 //! Error against run time, and the paper's evaluation.
 //!
-//! A study file says which materials are reconstructed from which readings and how they are judged; [`run()`] gives
-//! one CSV row for each material and angle, and a [`Summary`]. What is here so far needs no rig: readings are taken
-//! from the BRDF itself.
+//! A study file says what is measured, how, and how it is judged. There are two kinds: a [`Grid`] captures materials
+//! on the simulated rig under a paused clock, with every plan and every model, and sets the error beside the seconds
+//! that the rig took; an [`Evaluation`] is the paper's, whose readings are taken from the BRDF itself. Both write into
+//! a directory: rows as CSV, plots, a page.
 
+mod check;
 mod error;
-mod file;
-mod row;
-mod run;
+mod figure;
+mod grid;
+mod judge;
+mod ledger;
+mod material;
+mod measure;
+mod page;
+mod paper;
+mod statistics;
 mod study;
-mod summary;
+mod write;
 
 pub use error::Error;
-pub use row::Row;
-pub use run::{main_like, run};
-pub use study::{Material, Plane, Study, VirtualArc};
-pub use summary::{Angle, Summary};
+pub use grid::{Grid, GridPlan, GridRow, Source};
+pub use judge::Score;
+pub use material::Material;
+pub use measure::{Measured, measure};
+pub use paper::{Angle, Evaluation, Plane, Row, Summary, VirtualArc};
+pub use study::{Kind, Progress, Study};
+
+pub(crate) use study::read;

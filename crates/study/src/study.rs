@@ -1,100 +1,110 @@
-use std::sync::Arc;
+use std::fs;
+use std::path::Path;
 
-use brdf::Brdf;
-use pdv::{Distribution, Draw, Separable};
+use serde::Deserialize;
 
-use crate::Error;
+use crate::check::Check;
+use crate::{Error, Evaluation, Grid, grid, paper, write};
 
-/// A checked study.
+/// Told how much of the work is done, and of how much; from any thread.
+pub type Progress<'a> = dyn Fn(u64, u64) + Sync + 'a;
+
+/// The study that is run unless a file says otherwise.
+const BUILT_IN: &str = include_str!("../../../config/studies/error-against-time.toml");
+
+/// What a study file asks for: its key `study`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// A [`Grid`].
+    ErrorAgainstTime,
+    /// An [`Evaluation`].
+    Paper,
+}
+
+/// A checked study with the text that it was made of.
 #[derive(Clone)]
 pub struct Study {
-    /// What is reconstructed.
-    pub materials: Vec<Material>,
-    /// θ_r^dp of the planes, rad; one reconstruction for each.
-    pub theta_r: Vec<f64>,
-    /// How each plane is read.
-    pub plane: Plane,
-    /// How the arc is read.
-    pub arc: VirtualArc,
-    /// Pairs on which the reconstructions are judged.
-    pub draw: Draw,
+    what: What,
+    text: String,
 }
 
-/// A BRDF with its name.
 #[derive(Clone)]
-pub struct Material {
-    /// As the study file names it.
-    pub name: String,
-    /// The BRDF itself.
-    pub brdf: Arc<dyn Brdf>,
+enum What {
+    Grid(Grid),
+    Evaluation(Evaluation),
 }
 
-/// A plane that is read on the side towards the normal.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plane {
-    /// Values of d_p, the mirror direction among them.
-    pub readings: usize,
-    /// How they are distributed.
-    pub distribution: Distribution,
-    /// Largest zenith angle of the light on the far side, rad.
-    pub light_max: f64,
-}
-
-/// The mirror arc from the normal outwards.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct VirtualArc {
-    /// Values of θ_r, evenly.
-    pub readings: usize,
-    /// The largest of them, rad.
-    pub theta_max: f64,
-}
-
-impl Plane {
-    /// Deviations from the mirror direction, ascending from 0.
-    pub fn deviations(&self, theta_r: f64) -> Vec<f64> {
-        let reachable = 0.0..=theta_r.sin() + self.light_max.sin();
-        pdv::spread(self.distribution, theta_r, &[reachable], self.readings, 0.0).deviations
-    }
-}
-
-impl VirtualArc {
-    /// θ_r in rad, ascending from 0.
-    pub fn thetas(&self) -> Vec<f64> {
-        let intervals = self.readings.max(2) - 1;
-        (0..self.readings)
-            .map(|n| self.theta_max * n as f64 / intervals as f64)
-            .collect()
-    }
+#[derive(Deserialize)]
+struct Head {
+    study: Kind,
 }
 
 impl Study {
-    /// The same study on a hundredth of the pairs.
-    #[must_use]
-    pub fn quick(mut self) -> Self {
-        self.draw.pairs = (self.draw.pairs / 100).max(1);
-        self
-    }
-
-    /// One reconstruction of a material for each θ_r^dp.
+    /// Reads a study file, or takes the built-in one: error against run time. A `quick` one is a small part of it.
     ///
     /// # Errors
-    /// No pose of a plane or of the arc exists.
-    pub fn reconstruct(&self, material: &Material) -> Result<Vec<Separable>, Error> {
-        let arc = self.arc.thetas();
-        let model = |&theta_r: &f64| {
-            Separable::sample(
-                &material.brdf,
-                theta_r,
-                &self.plane.deviations(theta_r),
-                &arc,
-                0.0,
-            )
-            .map_err(|source| Error::Model {
-                material: material.name.clone(),
-                theta_r_deg: theta_r.to_degrees(),
-                source,
-            })
-        };
-        self.theta_r.iter().map(model).collect()
+    /// The file cannot be read, or as for [`Study::parse`].
+    pub fn read(path: Option<&Path>, quick: bool) -> Result<Self, Error> {
+        match path {
+            Some(path) => Self::parse(&read(path)?, &path.display().to_string(), quick),
+            None => Self::parse(BUILT_IN, "the built-in study", quick),
+        }
     }
+
+    /// Checks the text of a study file; `file` names it in errors.
+    ///
+    /// # Errors
+    /// An unknown or missing key, a wrong type, a value out of range, or a material that is not known.
+    pub fn parse(text: &str, file: &str, quick: bool) -> Result<Self, Error> {
+        let head: Head = Check { file }.parse(text)?;
+        let what = match head.study {
+            Kind::ErrorAgainstTime => What::Grid(Grid::parse(text, file, quick)?),
+            Kind::Paper => What::Evaluation(Evaluation::parse(text, file, quick)?),
+        };
+        let quick = if quick { "# quick\n" } else { "" };
+        Ok(Self {
+            what,
+            text: format!("{quick}{text}"),
+        })
+    }
+
+    /// Runs it into a directory, which is made where it is missing, and says what it found. A study that was
+    /// interrupted goes on.
+    ///
+    /// # Errors
+    /// The directory holds another study or cannot be written; a material cannot be measured or reconstructed.
+    pub fn run(&self, directory: &Path, progress: &Progress<'_>) -> Result<String, Error> {
+        let io = |what, path: &Path| {
+            let path = path.to_owned();
+            move |source| Error::Io { what, path, source }
+        };
+        fs::create_dir_all(directory).map_err(io("make the directory", directory))?;
+        let copy = directory.join("study.toml");
+        match fs::read_to_string(&copy) {
+            Ok(text) if text == self.text => {}
+            Ok(_) => {
+                return Err(Error::OtherStudy {
+                    directory: directory.to_owned(),
+                });
+            }
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                write::file(directory, "study.toml", self.text.as_bytes())?;
+            }
+            Err(error) => return Err(io("read", &copy)(error)),
+        }
+        match &self.what {
+            What::Grid(study) => grid::run(study, directory, progress),
+            What::Evaluation(study) => paper::run(study, directory, progress),
+        }
+    }
+}
+
+/// The text of a study file.
+pub(crate) fn read(path: &Path) -> Result<String, Error> {
+    fs::read_to_string(path).map_err(|source| Error::Io {
+        what: "read",
+        path: path.to_owned(),
+        source,
+    })
 }

@@ -1,15 +1,15 @@
 //! The paper's evaluation on few pairs, against figures that were measured independently.
 
-use study::Study;
+use study::Evaluation;
 
 #[test]
 fn the_separable_model_is_as_far_from_the_materials_as_it_should_be() {
     let text = include_str!("../../../config/studies/paper.toml");
-    let mut study = Study::parse(text, "paper.toml").unwrap();
+    let mut study = Evaluation::parse(text, "paper.toml", false).unwrap();
     study.draw.pairs = 10_000;
-    let mut rows = Vec::new();
-    let summary = study::run(&study, &mut rows, |_, _| {}).unwrap();
-    assert_eq!(String::from_utf8(rows).unwrap().lines().count(), 401);
+    let rows = study.rows(&|_, _| ()).unwrap();
+    assert_eq!(rows.len(), 400);
+    let summary = Evaluation::summary(&rows);
     for (angle, male) in summary.angles.iter().zip([0.0209, 0.0144, 0.0149, 0.0161]) {
         let off = angle.male_mean / male - 1.0;
         assert!(

@@ -2,7 +2,8 @@ use std::fmt;
 
 use serde::Serialize;
 
-use crate::Row;
+use super::Row;
+use crate::statistics::median;
 
 /// A study in a few numbers.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -36,30 +37,19 @@ impl Summary {
         angles.dedup();
         let angle = |theta_r_deg: f64| {
             let rows: Vec<&Row> = rows.iter().filter(|row| row.theta_r_deg == theta_r_deg).collect();
-            let male: Vec<f64> = rows.iter().filter_map(|row| row.metrics.male).collect();
+            let male: Vec<f64> = rows.iter().map(|row| row.male).collect();
             Angle {
                 theta_r_deg,
                 materials: rows.len(),
                 male_mean: male.iter().sum::<f64>() / male.len() as f64,
-                median_rel_median: median(rows.iter().filter_map(|row| row.metrics.median_rel).collect()),
-                eq4_median: median(rows.iter().filter_map(|row| row.metrics.eq4).collect()),
-                eq4_black: median(rows.iter().filter_map(|row| row.metrics.eq4_black).collect()),
+                median_rel_median: median(rows.iter().map(|row| row.median_rel)),
+                eq4_median: median(rows.iter().filter_map(|row| row.eq4)),
+                eq4_black: median(rows.iter().filter_map(|row| row.eq4_black)),
             }
         };
         Self {
             angles: angles.into_iter().map(angle).collect(),
         }
-    }
-}
-
-/// NaN of an empty list.
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let half = values.len() / 2;
-    match values.len() {
-        0 => f64::NAN,
-        n if n % 2 == 1 => values[half],
-        _ => (values[half - 1] + values[half]) / 2.0,
     }
 }
 

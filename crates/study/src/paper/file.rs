@@ -1,26 +1,23 @@
 use std::ops::RangeInclusive;
-use std::path::Path;
 
-use brdf::Fitted;
 use pdv::{Distribution, Draw};
 use serde::Deserialize;
 
-use crate::{Error, Material, Plane, Study, VirtualArc};
+use super::{Evaluation, Plane, VirtualArc};
+use crate::check::Check;
+use crate::material::Names;
+use crate::{Error, Kind};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct RawStudy {
-    materials: RawMaterials,
+    #[serde(rename = "study")]
+    _kind: Kind,
+    materials: Names,
     plane: RawPlane,
     arc: RawArc,
     compare: RawCompare,
-}
-
-#[derive(Deserialize)]
-#[serde(untagged)]
-enum RawMaterials {
-    One(String),
-    Many(Vec<String>),
+    spheres: RawSpheres,
 }
 
 #[derive(Deserialize)]
@@ -47,32 +44,23 @@ struct RawCompare {
     seed: u64,
 }
 
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawSpheres {
+    materials: Names,
+    theta_r_deg: f64,
+}
+
 const READINGS: RangeInclusive<usize> = 1..=2000;
 
-impl Study {
-    /// Reads a study file.
-    ///
-    /// # Errors
-    /// The file cannot be read, or as for [`Study::parse`].
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path).map_err(|source| Error::Io {
-            what: "read",
-            path: path.to_owned(),
-            source,
-        })?;
-        Self::parse(&text, &path.display().to_string())
-    }
-
-    /// Checks the text of a study file; `file` names it in errors.
+impl Evaluation {
+    /// Reads the text of a study file; `file` names it in errors. A `quick` one has a hundredth of the pairs.
     ///
     /// # Errors
     /// An unknown or missing key, a wrong type, a value out of range, or a material that is not known.
-    pub fn parse(text: &str, file: &str) -> Result<Self, Error> {
-        let raw: RawStudy = toml::from_str(text).map_err(|error| Error::Syntax {
-            file: file.to_owned(),
-            message: error.to_string(),
-        })?;
+    pub fn parse(text: &str, file: &str, quick: bool) -> Result<Self, Error> {
         let check = Check { file };
+        let raw: RawStudy = check.parse(text)?;
         if raw.plane.theta_r_deg.is_empty() {
             return Err(check.range("plane.theta_r_deg", "empty", "at least one angle"));
         }
@@ -84,7 +72,7 @@ impl Study {
                 "0 … below 90",
             )?;
         }
-        let (plane, arc, compare) = (raw.plane, raw.arc, raw.compare);
+        let (plane, arc, compare) = (&raw.plane, &raw.arc, &raw.compare);
         let quarter = 0.0..=90.0;
         check.number(
             "plane.readings",
@@ -123,9 +111,18 @@ impl Study {
             theta_max > 0.0 && theta_max <= 90.0,
             "above 0 … 90",
         )?;
+        let shown = raw.spheres.theta_r_deg;
+        check.number(
+            "spheres.theta_r_deg",
+            shown,
+            raw.plane.theta_r_deg.contains(&shown),
+            "one of plane.theta_r_deg",
+        )?;
         Ok(Self {
-            materials: check.materials(raw.materials)?,
-            theta_r: plane.theta_r_deg.iter().map(|deg| deg.to_radians()).collect(),
+            materials: raw.materials.materials(file)?,
+            spheres: raw.spheres.materials.materials(file)?,
+            shown: shown.to_radians(),
+            theta_r: raw.plane.theta_r_deg.iter().map(|deg| deg.to_radians()).collect(),
             plane: Plane {
                 readings: plane.readings,
                 distribution: plane.distribution,
@@ -136,7 +133,11 @@ impl Study {
                 theta_max: arc.theta_max_deg.to_radians(),
             },
             draw: Draw {
-                pairs: compare.pairs,
+                pairs: if quick {
+                    compare.pairs.div_ceil(100)
+                } else {
+                    compare.pairs
+                },
                 theta_max: theta_max.to_radians(),
                 seed: compare.seed,
             },
@@ -144,65 +145,15 @@ impl Study {
     }
 }
 
-struct Check<'a> {
-    file: &'a str,
-}
-
-impl Check<'_> {
-    fn range(&self, key: &'static str, value: impl ToString, allowed: &'static str) -> Error {
-        Error::Range {
-            file: self.file.to_owned(),
-            key,
-            value: value.to_string(),
-            allowed,
-        }
-    }
-
-    fn number(
-        &self,
-        key: &'static str,
-        value: impl ToString,
-        good: bool,
-        allowed: &'static str,
-    ) -> Result<(), Error> {
-        if good {
-            Ok(())
-        } else {
-            Err(self.range(key, value, allowed))
-        }
-    }
-
-    fn materials(&self, raw: RawMaterials) -> Result<Vec<Material>, Error> {
-        let names = match raw {
-            RawMaterials::One(all) if all == "all" => {
-                Fitted::all().map(|(name, _)| name.to_owned()).collect()
-            }
-            RawMaterials::One(name) => vec![name],
-            RawMaterials::Many(names) => names,
-        };
-        if names.is_empty() {
-            return Err(self.range("materials", "empty", "\"all\" or at least one name"));
-        }
-        let known = |name: String| match brdf::specimen(&name) {
-            Ok(brdf) => Ok(Material { name, brdf }),
-            Err(source) => Err(Error::Material {
-                file: self.file.to_owned(),
-                source,
-            }),
-        };
-        names.into_iter().map(known).collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const SHIPPED: &str = include_str!("../../../config/studies/paper.toml");
+    const SHIPPED: &str = include_str!("../../../../config/studies/paper.toml");
 
     fn error(from: &str, to: &str) -> String {
         assert!(SHIPPED.contains(from), "{from} is not in the shipped file");
-        match Study::parse(&SHIPPED.replacen(from, to, 1), "study.toml") {
+        match Evaluation::parse(&SHIPPED.replacen(from, to, 1), "study.toml", false) {
             Ok(_) => panic!("{to} was accepted"),
             Err(error) => format!(
                 "{error}: {:?}",
@@ -213,7 +164,7 @@ mod tests {
 
     #[test]
     fn the_shipped_file_is_the_papers_evaluation() {
-        let study = Study::parse(SHIPPED, "paper.toml").unwrap();
+        let study = Evaluation::parse(SHIPPED, "paper.toml", false).unwrap();
         assert_eq!(study.materials.len(), 100);
         assert_eq!(study.theta_r.len(), 4);
         assert_eq!(study.draw.pairs, 3_600_000);

@@ -1,0 +1,15 @@
+//! Error against run time: materials × plans × models on the simulated rig, beside what needs no such rig.
+
+mod baseline;
+mod document;
+mod file;
+mod front;
+mod pca;
+mod plan;
+mod row;
+mod run;
+
+pub use file::Grid;
+pub use plan::GridPlan;
+pub use row::{GridRow, Source};
+pub(crate) use run::run;

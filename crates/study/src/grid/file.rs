@@ -1,0 +1,144 @@
+use std::path::Path;
+
+use pdv::Draw;
+use serde::Deserialize;
+use sweep::Model;
+
+use super::GridPlan;
+use crate::check::Check;
+use crate::material::{Material, Names};
+use crate::{Error, Kind};
+
+/// A checked study of error against run time.
+#[derive(Clone)]
+pub struct Grid {
+    /// What is measured.
+    pub materials: Vec<Material>,
+    /// What log-relative PCA learns from: all that the file names, of which `materials` are every n-th.
+    pub known: Vec<Material>,
+    /// What is taken of each.
+    pub plans: Vec<GridPlan>,
+    /// What is made of it.
+    pub models: Vec<Model>,
+    /// Numbers of readings of log-relative PCA.
+    pub pca: Vec<usize>,
+    /// Folds of its cross-validation.
+    pub folds: usize,
+    /// On which pairs all are judged; its seed is that of the captures, too.
+    pub draw: Draw,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Raw {
+    #[serde(rename = "study")]
+    _kind: Kind,
+    materials: Names,
+    every: usize,
+    models: Vec<Model>,
+    plans: RawPlans,
+    pca: RawPca,
+    compare: RawCompare,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPlans {
+    planes_deg: Vec<Vec<f64>>,
+    readings: Vec<usize>,
+    arc: Vec<usize>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPca {
+    readings: Vec<usize>,
+    folds: usize,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawCompare {
+    pairs: u64,
+    theta_max_deg: f64,
+    seed: u64,
+}
+
+impl Grid {
+    /// Reads the text of a study file; `file` names it in errors. A `quick` one has every tenth of the materials, a
+    /// fifth of the pairs, and of readings and arc the first, the middle and the last.
+    ///
+    /// # Errors
+    /// An unknown or missing key, a wrong type, a value out of range, or a material that is not known.
+    pub fn parse(text: &str, file: &str, quick: bool) -> Result<Self, Error> {
+        let check = Check { file };
+        let raw: Raw = check.parse(text)?;
+        check.number("every", raw.every, raw.every > 0, "1 …")?;
+        let materials = raw.materials.materials(file)?;
+        let every = if quick { raw.every.max(10) } else { raw.every };
+        if raw.models.is_empty() {
+            return Err(check.range("models", "empty", "at least one"));
+        }
+        let plans = raw.plans;
+        if plans.planes_deg.is_empty() || plans.planes_deg.iter().any(Vec::is_empty) {
+            return Err(check.range("plans.planes_deg", "empty", "lists of at least one angle"));
+        }
+        check.list("plans.readings", &plans.readings, |n| n > 0, "1 … 2000")?;
+        check.list("plans.arc", &plans.arc, |n| n <= 2000, "0 … 2000")?;
+        check.list("pca.readings", &raw.pca.readings, |n| n > 0, "1 …")?;
+        check.number("pca.folds", raw.pca.folds, raw.pca.folds > 1, "2 …")?;
+        let RawCompare {
+            pairs,
+            theta_max_deg,
+            seed,
+        } = raw.compare;
+        let good = (1..=1_000_000).contains(&pairs);
+        check.number("compare.pairs", pairs, good, "1 … 1e6")?;
+        let good = theta_max_deg > 0.0 && theta_max_deg <= 90.0;
+        check.number("compare.theta_max_deg", theta_max_deg, good, "above 0 … 90")?;
+        let thin = |list: Vec<usize>| if quick { ends_and_middle(&list) } else { list };
+        let (readings, arcs) = (thin(plans.readings), thin(plans.arc));
+        let mut cells = Vec::new();
+        for planes_deg in plans.planes_deg {
+            for &readings in &readings {
+                for &arc in &arcs {
+                    let plan = GridPlan {
+                        planes_deg: planes_deg.clone(),
+                        readings,
+                        arc,
+                    };
+                    plan.job()?;
+                    cells.push(plan);
+                }
+            }
+        }
+        Ok(Self {
+            materials: materials.iter().step_by(every).cloned().collect(),
+            known: materials,
+            plans: cells,
+            models: raw.models,
+            pca: raw.pca.readings,
+            folds: raw.pca.folds,
+            draw: Draw {
+                pairs: if quick { pairs.div_ceil(5) } else { pairs },
+                theta_max: theta_max_deg.to_radians(),
+                seed,
+            },
+        })
+    }
+
+    /// Reads a study file.
+    ///
+    /// # Errors
+    /// The file cannot be read, or as for [`Grid::parse`].
+    pub fn read(path: &Path, quick: bool) -> Result<Self, Error> {
+        Self::parse(&crate::read(path)?, &path.display().to_string(), quick)
+    }
+}
+
+fn ends_and_middle(list: &[usize]) -> Vec<usize> {
+    let last = list.len() - 1;
+    let mut at = vec![0, last / 2, last];
+    at.dedup();
+    at.into_iter().map(|i| list[i]).collect()
+}

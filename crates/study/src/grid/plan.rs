@@ -1,0 +1,67 @@
+use std::fmt::Write;
+
+use sweep::{Job, Model};
+
+use crate::Error;
+
+/// Which readings are taken: one cell of the grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GridPlan {
+    /// θ_r of the planes, degrees.
+    pub planes_deg: Vec<f64>,
+    /// Readings of each plane.
+    pub readings: usize,
+    /// Readings of the arc; 0: no arc.
+    pub arc: usize,
+}
+
+impl GridPlan {
+    /// What rows call the planes: "0 45 75".
+    pub fn planes(&self) -> String {
+        self.planes_deg
+            .iter()
+            .map(f64::to_string)
+            .collect::<Vec<_>>()
+            .join(" ")
+    }
+
+    /// Readings of planes and arc together.
+    pub fn total(&self) -> usize {
+        self.planes_deg.len() * self.readings + self.arc
+    }
+
+    /// The job file that asks for it, checked as every job is.
+    ///
+    /// # Errors
+    /// What a job file may not ask for.
+    pub fn job(&self) -> Result<Job, Error> {
+        let mut text = String::new();
+        for theta_r in &self.planes_deg {
+            let plane = writeln!(
+                text,
+                "[[plane]]\ntheta_r_deg = {theta_r:?}\nreadings = {}",
+                self.readings
+            );
+            plane.expect("writing to a String does not fail");
+        }
+        if self.arc > 0 {
+            text += &format!("[arc]\nreadings = {}\n", self.arc);
+        }
+        let name = format!(
+            "{} planes, {} readings, arc {}",
+            self.planes(),
+            self.readings,
+            self.arc
+        );
+        Ok(Job::parse(&text, &name)?)
+    }
+
+    /// Whether a model has something of its own to say on it: one plane's models are made of one plane, and those of
+    /// several are on a single plane what [`Model::Reciprocal`] is.
+    pub fn suits(&self, model: Model) -> bool {
+        match self.planes_deg.len() {
+            1 => model != Model::Planes,
+            _ => !model.of_one_plane(),
+        }
+    }
+}

@@ -1,0 +1,58 @@
+use serde::{Deserialize, Serialize};
+
+/// Where a reconstruction comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Source {
+    /// The simulated rig, with all its imperfections.
+    Rig,
+    /// Readings of a perfect instrument, more than any rig would take: what the model cannot go below.
+    Floor,
+    /// Something else, which knows no rig: black, log-relative PCA.
+    Baseline,
+}
+
+/// One reconstruction: a line of study.csv. What does not exist is empty.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GridRow {
+    /// Which material.
+    pub material: String,
+    /// Where the readings come from.
+    pub source: Source,
+    /// θ_r of the planes in degrees, with spaces between.
+    pub planes_deg: String,
+    /// Readings asked for of each plane.
+    pub readings: usize,
+    /// Readings asked for of the arc.
+    pub arc: usize,
+    /// Which model.
+    pub model: String,
+    /// Readings that counted.
+    pub taken: usize,
+    /// Exposures, with dark ones and those that were repeated.
+    pub exposures: usize,
+    /// Seconds that the simulated rig took.
+    pub rig_s: Option<f64>,
+    /// Seconds of one core that making the model took.
+    pub fit_s: Option<f64>,
+    /// See [`crate::Score`].
+    pub male: f64,
+    /// See [`crate::Score`].
+    pub median_rel: f64,
+    /// See [`crate::Score`].
+    pub p95_rel: f64,
+}
+
+impl GridRow {
+    /// What tells it from every other row.
+    pub fn key(&self) -> (String, Source, String, usize, usize, String) {
+        (
+            self.material.clone(),
+            self.source,
+            self.planes_deg.clone(),
+            self.readings,
+            self.arc,
+            self.model.clone(),
+        )
+    }
+}

@@ -1,0 +1,108 @@
+use std::f64::consts::TAU;
+
+use brdf::{Brdf, Spherical};
+use glam::DVec3;
+use pdv::Draw;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Floor of relative errors, sr⁻¹, as in [`pdv::Metrics`].
+pub(crate) const FLOOR: f64 = 1e-3;
+
+/// Pairs of directions, drawn once, on which many estimates are judged.
+#[derive(Clone, Debug)]
+pub(crate) struct Judge {
+    pairs: Vec<(DVec3, DVec3)>,
+}
+
+/// How far an estimate is from a reference, channels pooled; as in [`pdv::Metrics`], quantiles exact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Score {
+    /// Mean |ln(1 + f cos θ_i) − ln(1 + f̂ cos θ_i)|.
+    pub male: f64,
+    /// Median of |f̂ − f|/max(f, 1e-3 sr⁻¹).
+    pub median_rel: f64,
+    /// 95th percentile of the same.
+    pub p95_rel: f64,
+}
+
+impl Judge {
+    /// θ_i, θ_o and the azimuth between them evenly, from one stream of random numbers.
+    pub(crate) fn new(draw: &Draw) -> Self {
+        Self::stream(draw, 0)
+    }
+
+    /// The same from another stream of the same seed.
+    pub(crate) fn stream(draw: &Draw, stream: u64) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(draw.seed);
+        rng.set_stream(stream);
+        let mut direction = |turned: f64| {
+            let theta = rng.random::<f64>() * draw.theta_max;
+            let phi = rng.random::<f64>() * TAU * turned;
+            Spherical { theta, phi }.direction()
+        };
+        let pairs = (0..draw.pairs).map(|_| (direction(1.0), direction(0.0)));
+        Self {
+            pairs: pairs.collect(),
+        }
+    }
+
+    pub(crate) fn pairs(&self) -> &[(DVec3, DVec3)] {
+        &self.pairs
+    }
+
+    /// Values of a BRDF at every pair.
+    pub(crate) fn values(&self, brdf: &(impl Brdf + ?Sized)) -> Vec<DVec3> {
+        self.pairs.iter().map(|&(i, o)| brdf.eval(i, o)).collect()
+    }
+
+    /// The score of values at every pair.
+    pub(crate) fn score(&self, reference: &[DVec3], estimate: &[DVec3]) -> Score {
+        let mut male = 0.0;
+        let mut relative = Vec::with_capacity(3 * reference.len());
+        for (((incident, _), f), g) in self.pairs.iter().zip(reference).zip(estimate) {
+            for (f, g) in f.to_array().into_iter().zip(g.to_array()) {
+                male += ((1.0 + g * incident.z) / (1.0 + f * incident.z)).ln().abs();
+                relative.push((g - f).abs() / f.max(FLOOR));
+            }
+        }
+        let n = relative.len();
+        let mut quantile = |q: f64| {
+            let at = ((q * n as f64) as usize).min(n - 1);
+            *relative.select_nth_unstable_by(at, f64::total_cmp).1
+        };
+        Score {
+            male: male / n as f64,
+            median_rel: quantile(0.5),
+            p95_rel: quantile(0.95),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use brdf::Fitted;
+
+    #[test]
+    fn agrees_with_the_metrics_of_a_run() {
+        let draw = Draw {
+            pairs: 100_000,
+            ..Draw::default()
+        };
+        let (gold, brass) = (Fitted::named("gold-paint"), Fitted::named("brass"));
+        let (gold, brass) = (gold.unwrap(), brass.unwrap());
+        let judge = Judge::new(&draw);
+        let score = judge.score(&judge.values(&gold), &judge.values(&brass));
+        let metrics = pdv::compare(&gold, &[&brass], &draw)[0].overall;
+        // Other random numbers, so 1/√pairs apart.
+        for (ours, theirs) in [
+            (score.male, metrics.male),
+            (score.median_rel, metrics.median_rel),
+            (score.p95_rel, metrics.p95_rel),
+        ] {
+            let theirs = theirs.unwrap();
+            assert!((ours / theirs - 1.0).abs() < 0.02, "{ours}, not {theirs}");
+        }
+    }
+}
