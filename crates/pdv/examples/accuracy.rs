@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use brdf::{Brdf, Fitted, MerlTable};
 use glam::DVec3;
-use pdv::{Distribution, Draw, Observation, Planes, Separable, compare, spread};
+use pdv::{Bivariate, Distribution, Draw, Observation, Planes, Separable, compare, spread};
 
 /// The arms come no closer and go no further, degrees.
 const SEPARATION_DEG: f64 = 5.0;
@@ -31,11 +31,11 @@ const PLANS: [Plan; 3] = [
     },
     Plan {
         planes_deg: &[20.0, 45.0, 70.0],
-        readings: 13,
-        arc: 9,
+        readings: 14,
+        arc: 6,
     },
     Plan {
-        planes_deg: &[5.0, 20.0, 35.0, 50.0, 65.0, 75.0, 82.0],
+        planes_deg: &[10.0, 22.0, 35.0, 48.0, 60.0, 70.0, 80.0],
         readings: 90,
         arc: 90,
     },
@@ -94,9 +94,11 @@ fn rows(name: &str, brdf: &dyn Brdf) -> Result<Vec<Row>, pdv::Error> {
         let (planes, along) = (plan.planes(brdf, Distribution::Lobe), plan.along(brdf));
         let model = Planes::from_observations(&planes, &along)?;
         let separable = Separable::from_observations(&planes[planes.len() - 1], &along)?;
-        let models: [(&'static str, &dyn Brdf); 3] = [
+        let bivariate = Bivariate::from_observations(&planes, &along)?;
+        let models: [(&'static str, &dyn Brdf); 4] = [
             ("planes", &model),
             ("planes, in f64", &Exact(&model)),
+            ("bivariate", &bivariate),
             ("separable", &separable),
         ];
         let found = compare(brdf, &models.map(|(_, model)| model), &draw);
@@ -127,10 +129,10 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, std::io::Error> {
 
 fn print(rows: &[Row]) {
     println!(
-        "planes                       readings  model            MALE mean   median   worst    median rel. error"
+        "planes                                     readings  model            MALE mean   median   worst    median rel. error"
     );
     for (n, plan) in PLANS.iter().enumerate() {
-        for model in ["planes", "planes, in f64", "separable"] {
+        for model in ["planes", "planes, in f64", "bivariate", "separable"] {
             let mut of: Vec<&Row> = rows.iter().filter(|r| r.plan == n && r.model == model).collect();
             of.sort_by(|a, b| a.male.total_cmp(&b.male));
             let Some(worst) = of.last() else { continue };
@@ -138,7 +140,7 @@ fn print(rows: &[Row]) {
                 rows.iter().map(|row| of(row)).sum::<f64>() / rows.len() as f64
             };
             println!(
-                "{:28} {:<9} {:16} {:.5}     {:.5}  {:.5}  {:.4}   worst {}",
+                "{:42} {:<9} {:16} {:.5}     {:.5}  {:.5}  {:.4}   worst {}",
                 format!("{:?}", plan.planes_deg),
                 plan.planes_deg.len() * plan.readings + plan.arc,
                 model,

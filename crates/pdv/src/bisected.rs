@@ -71,6 +71,14 @@ impl Pair {
         }
     }
 
+    /// Half and difference angle as they are.
+    pub(crate) fn bisected(&self) -> Bisected {
+        Bisected {
+            theta_h: angle(self.sin_h, self.cos_h),
+            theta_d: angle(self.sin_d, self.cos_d),
+        }
+    }
+
     /// The pair in the plane with the same half angle and the same product of cosines.
     pub(crate) fn same_half(&self) -> Bisected {
         Bisected {

@@ -5,7 +5,9 @@
 //! Parameterization". The crate knows nothing of arms, rigs or files.
 
 mod albedo;
+mod auto;
 mod bisected;
+mod bivariate;
 mod choice;
 mod compare;
 mod coordinates;
@@ -27,12 +29,14 @@ mod sweeps;
 mod table;
 
 pub use albedo::albedo;
+pub use auto::Auto;
+pub use bivariate::Bivariate;
 pub use compare::{Channels, Comparison, Draw, Metrics, compare};
 pub use coordinates::{Pdv, light_angle};
 pub use density::{Density, mean_reflectance};
 pub use error::Error;
 pub use factor::Factor;
-pub use model::{FactorTable, Model};
+pub use model::{Basis, FactorTable, Model};
 pub use observation::Observation;
 pub use planes::Planes;
 pub use separable::Separable;

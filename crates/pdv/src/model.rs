@@ -1,17 +1,39 @@
 use brdf::Brdf;
 use glam::DVec3;
+use serde::Serialize;
 
 /// A BRDF that was made of the readings of a few sweeps.
 pub trait Model: Brdf {
-    /// Whether the answer for these unit vectors rests on nothing that was measured: θ_r or d_p lies beyond the
-    /// range of a factor.
-    fn extrapolated(&self, incident: DVec3, exitant: DVec3) -> bool;
+    /// What the answer for these unit vectors rests on.
+    fn basis(&self, incident: DVec3, exitant: DVec3) -> Basis;
+
+    /// Whether the answer for these unit vectors rests on nothing that was measured.
+    fn extrapolated(&self, incident: DVec3, exitant: DVec3) -> bool {
+        self.basis(incident, exitant) != Basis::Interpolated
+    }
+
+    /// Whether f is constant along φ_p, so that its directional albedo is a one-dimensional integral.
+    fn phi_p_constant(&self) -> bool {
+        false
+    }
 
     /// What it is and how it was made, in words, to follow "it is": no capital, no full stop.
     fn about(&self) -> String;
 
     /// The one-dimensional factors, for people and files.
     fn factors(&self) -> Vec<FactorTable>;
+}
+
+/// What the answer of a model rests on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Basis {
+    /// Both factors were read around it.
+    Interpolated,
+    /// It lies beyond the range of a factor.
+    Extrapolated,
+    /// The arms hide each other there, so that nobody could have read it: near retro-reflection, and near the normal.
+    Occluded,
 }
 
 /// A factor as a table.

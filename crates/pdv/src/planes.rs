@@ -2,6 +2,7 @@ use brdf::Brdf;
 use glam::DVec3;
 
 use crate::bisected::Pair;
+use crate::model::Basis;
 use crate::surface::Surface;
 use crate::sweeps::Sweeps;
 use crate::table::Table;
@@ -45,8 +46,7 @@ impl Planes {
     pub fn from_observations(planes: &[Vec<Observation>], arc: &[Observation]) -> Result<Self, Error> {
         let sweeps = Sweeps::new(planes, arc)?;
         let (surface, error) = crate::choice::choose(&sweeps)?;
-        let light = DVec3::select(sweeps.least.cmpeq(DVec3::ZERO), DVec3::ZERO, DVec3::ONE);
-        let (table, loss) = Table::bake(|pose| surface.at(pose, None), light);
+        let (table, loss) = Table::bake(|pose| surface.at(pose, None), sweeps.light());
         Ok(Self {
             surface,
             table,
@@ -108,9 +108,8 @@ impl Brdf for Planes {
 }
 
 impl Model for Planes {
-    fn extrapolated(&self, incident: DVec3, exitant: DVec3) -> bool {
-        let pose = Pair::new(incident, exitant).same_half();
-        !self.surface.lobe.covers(pose.theta_h) || self.surface.f.extrapolated(pose.theta_d)
+    fn basis(&self, incident: DVec3, exitant: DVec3) -> Basis {
+        self.surface.basis(Pair::new(incident, exitant).same_half())
     }
 
     fn about(&self) -> String {
@@ -140,22 +139,6 @@ impl Model for Planes {
     }
 
     fn factors(&self) -> Vec<FactorTable> {
-        let degrees = |(theta, value): (f64, DVec3)| (theta.to_degrees(), value);
-        let f = FactorTable {
-            name: "F",
-            variable: "theta_d_deg",
-            rows: self.surface.f.points().map(degrees).collect(),
-        };
-        let side = |rows: Vec<(f64, DVec3)>| FactorTable {
-            name: "G",
-            variable: "theta_h_deg",
-            rows: rows
-                .into_iter()
-                .map(|(theta_h, log)| (theta_h, log.map(f64::exp)))
-                .collect(),
-        };
-        std::iter::once(f)
-            .chain(self.surface.lobe.rows().map(side))
-            .collect()
+        self.surface.factors()
     }
 }

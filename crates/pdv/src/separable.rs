@@ -1,11 +1,14 @@
 use brdf::Brdf;
 use glam::DVec3;
 
+use crate::model::Basis;
 use crate::sides::Sides;
 use crate::{Error, Factor, FactorTable, Model, Observation};
 
 /// G(x) below this, ln(1 + 1e-6 sr⁻¹), is black: no ratio can be made of it.
 const BLACK: f64 = 1e-6;
+/// What rounding may carry a squared sine below the first that was read.
+const ROUNDING: f64 = 1e-12;
 /// Largest ln(1 + ρ), ρ = 1e13 sr⁻¹.
 const LOG_MAX: f64 = 30.0;
 /// Largest difference of θ_r within a plane, rad: what a servo may stand off its goal, and no other plane.
@@ -127,6 +130,30 @@ impl Separable {
     }
 }
 
+impl Separable {
+    /// Whether a d_p² lies where the light of the plane would stand before the sensor: between the readings next to
+    /// the retro-reflection at 2 sin θ_r, where they are farther apart than their neighbours.
+    fn in_hole(&self, d_p: f64) -> bool {
+        let nodes: Vec<f64> = self.g.points().map(|(square, _)| square).collect();
+        let retro = (2.0 * self.theta_r.sin()).powi(2);
+        let after = nodes.partition_point(|&node| node < retro);
+        if after == 0 || after == nodes.len() || !(nodes[after - 1] < d_p && d_p < nodes[after]) {
+            return false;
+        }
+        let width = |n: usize| {
+            nodes
+                .get(n)
+                .zip(nodes.get(n.wrapping_sub(1)))
+                .map(|(b, a)| b.sqrt() - a.sqrt())
+        };
+        let here = width(after).unwrap_or_default();
+        [after.wrapping_sub(1), after + 1]
+            .into_iter()
+            .filter_map(width)
+            .all(|next| here > next)
+    }
+}
+
 impl Brdf for Separable {
     #[inline]
     fn eval(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
@@ -140,9 +167,19 @@ impl Brdf for Separable {
 }
 
 impl Model for Separable {
-    fn extrapolated(&self, incident: DVec3, exitant: DVec3) -> bool {
+    fn basis(&self, incident: DVec3, exitant: DVec3) -> Basis {
         let [sin_o, d_p] = squares(incident, exitant);
-        self.f.extrapolated(sin_o) || self.g.extrapolated(d_p)
+        if sin_o < self.f.range().0 - ROUNDING || self.in_hole(d_p) {
+            Basis::Occluded
+        } else if self.f.extrapolated(sin_o) || self.g.extrapolated(d_p) {
+            Basis::Extrapolated
+        } else {
+            Basis::Interpolated
+        }
+    }
+
+    fn phi_p_constant(&self) -> bool {
+        true
     }
 
     fn about(&self) -> String {

@@ -2,14 +2,17 @@ use glam::DVec3;
 
 use crate::bisected::{Bisected, Pair, RISE};
 use crate::lobe::Lobe;
+use crate::model::Basis;
 use crate::shape::Excess;
 use crate::sweeps::{Point, Sweeps};
-use crate::{Error, Factor, Shape};
+use crate::{Error, Factor, FactorTable, Shape};
 
 /// ε of the errors by which a shape is chosen, sr⁻¹.
 const EPSILON: f64 = 0.1;
 /// How far from the peak, rad, an arc may be read and count as the peak.
 const ON_PEAK: f64 = 1e-6;
+/// What rounding may carry a difference angle below the smallest that was read, rad.
+const ROUNDING: f64 = 1e-9;
 
 /// The reflectance of pairs in one plane with the normal, from the readings, and what follows from it for all others.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,6 +22,8 @@ pub(crate) struct Surface {
     pub(crate) f: Factor,
     /// G over θ_h and θ_d.
     pub(crate) lobe: Lobe,
+    /// The smallest θ_d, rad, that was read: closer to retro-reflection the arms hide each other.
+    hidden: f64,
 }
 
 impl Surface {
@@ -43,7 +48,12 @@ impl Surface {
             f = Factor::new("F", sweeps.arc.iter().map(|p| (p.theta_d, at_peak(p))))?;
             g = lobe(&f)?;
         }
-        Ok(Self { excess, f, lobe: g })
+        Ok(Self {
+            excess,
+            f,
+            lobe: g,
+            hidden: sweeps.points().map(|p| p.theta_d).fold(f64::INFINITY, f64::min),
+        })
     }
 
     /// The reflectance of a pair in the plane, sr⁻¹; `without` names a side that is not used.
@@ -92,5 +102,35 @@ impl Surface {
             }
         }
         (sides > 1.0).then(|| sum / sides)
+    }
+
+    /// What a pair in the plane rests on.
+    pub(crate) fn basis(&self, pose: Bisected) -> Basis {
+        if pose.theta_d < self.hidden - ROUNDING {
+            Basis::Occluded
+        } else if !self.lobe.covers(pose.theta_h) || self.f.extrapolated(pose.theta_d) {
+            Basis::Extrapolated
+        } else {
+            Basis::Interpolated
+        }
+    }
+
+    /// The one-dimensional factors, for people and files.
+    pub(crate) fn factors(&self) -> Vec<FactorTable> {
+        let degrees = |(theta, value): (f64, DVec3)| (theta.to_degrees(), value);
+        let f = FactorTable {
+            name: "F",
+            variable: "theta_d_deg",
+            rows: self.f.points().map(degrees).collect(),
+        };
+        let side = |rows: Vec<(f64, DVec3)>| FactorTable {
+            name: "G",
+            variable: "theta_h_deg",
+            rows: rows
+                .into_iter()
+                .map(|(theta_h, log)| (theta_h, log.map(f64::exp)))
+                .collect(),
+        };
+        std::iter::once(f).chain(self.lobe.rows().map(side)).collect()
     }
 }

@@ -128,6 +128,11 @@ impl Sweeps {
         })
     }
 
+    /// 0 in a channel without any light, else 1.
+    pub(crate) fn light(&self) -> DVec3 {
+        DVec3::select(self.least.cmpeq(DVec3::ZERO), DVec3::ZERO, DVec3::ONE)
+    }
+
     pub(crate) fn points(&self) -> impl Iterator<Item = &Point> + Clone {
         self.sides.iter().flat_map(|side| &side.points).chain(&self.arc)
     }

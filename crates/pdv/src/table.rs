@@ -249,7 +249,7 @@ fn pose(axis: Axis, column: f64, row: f64) -> Bisected {
 
 /// 2ˣ to 2e-7 of itself for |x| ≤ 126, in all lanes at once; finite for every x.
 #[inline(always)]
-fn exp2(x: Vec4) -> Vec4 {
+pub(crate) fn exp2(x: Vec4) -> Vec4 {
     /// Adding it leaves a whole number in the last bits.
     const WHOLE: f32 = 12_582_912.0;
     let x = x.max(Vec4::splat(-126.0)).min(Vec4::splat(126.0));
@@ -268,7 +268,7 @@ fn exp2(x: Vec4) -> Vec4 {
 }
 
 /// log₂ of RGB as it is stored.
-fn logs(rgb: DVec3) -> Vec3 {
+pub(crate) fn logs(rgb: DVec3) -> Vec3 {
     Vec3::from_array(rgb.to_array().map(|f| f.log2().clamp(-LOG_MAX, LOG_MAX) as f32))
 }
 

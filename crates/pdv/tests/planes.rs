@@ -4,7 +4,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use brdf::{Black, Brdf, Fitted, Lambert, Mirror, Spherical};
 use glam::DVec3;
-use pdv::{Distribution, Draw, Error, Model, Observation, Planes, Shape, compare, spread};
+use pdv::{
+    Auto, Basis, Bivariate, Distribution, Draw, Error, Model, Observation, Planes, Shape, compare, spread,
+};
 use proptest::prelude::*;
 
 /// The arms come no closer, rad.
@@ -355,6 +357,75 @@ fn says_what_it_has_not_measured() {
 }
 
 #[test]
+fn tells_what_the_arms_hide_from_what_lies_beyond() {
+    let gold = fitted("gold-paint");
+    let planes: Vec<_> = [20.0, 60.0].map(|deg| plane(&gold, deg, 30)).into();
+    let along = arc(&gold, 30, 0.0);
+    let models: [Box<dyn Model>; 2] = [
+        Box::new(Planes::from_observations(&planes, &along).unwrap()),
+        Box::new(Bivariate::from_observations(&planes, &along).unwrap()),
+    ];
+    for model in models {
+        let basis = |theta_i: f64, theta_o: f64, phi: f64| {
+            let (incident, exitant) = pair(theta_i, theta_o, phi);
+            model.basis(incident, exitant)
+        };
+        assert_eq!(basis(0.5, 0.9, 2.0), Basis::Interpolated, "{}", model.about());
+        assert_eq!(basis(0.5, 0.51, 0.0), Basis::Occluded, "{}", model.about());
+        assert_eq!(basis(1.5, 1.5, PI), Basis::Extrapolated, "{}", model.about());
+    }
+}
+
+/// What depends on half and difference angle alone is the bivariate table's own.
+#[test]
+fn a_bivariate_material_is_bivariate() {
+    struct Bump;
+    impl Brdf for Bump {
+        fn eval(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
+            let half = (incident + exitant).normalize();
+            let (tan, cos_d) = (half.x.hypot(half.y) / half.z, half.dot(incident));
+            DVec3::new(1.0, 0.5, 0.2) * (3.0 * (-tan * tan / 0.1).exp() + 0.2 + (1.0 - cos_d).powi(5))
+        }
+    }
+    let planes: Vec<_> = [10.0, 30.0, 50.0, 70.0].map(|deg| plane(&Bump, deg, 60)).into();
+    let model = Bivariate::from_observations(&planes, &arc(&Bump, 60, 0.0)).unwrap();
+    for (theta_i, theta_o, phi) in [(0.3, 0.6, 2.0), (0.9, 0.4, 1.0), (1.0, 1.1, 3.0), (0.7, 0.7, 1.6)] {
+        let (incident, exitant) = pair(theta_i, theta_o, phi);
+        let (found, truth) = (model.eval(incident, exitant), Bump.eval(incident, exitant));
+        assert!(
+            off(found, truth) < 0.03,
+            "{found} instead of {truth} at {theta_i}, {theta_o}, {phi}"
+        );
+        assert_eq!(found, model.eval(exitant, incident));
+    }
+}
+
+#[test]
+fn auto_takes_what_predicts_best_and_says_why() {
+    let gold = fitted("gold-paint");
+    let planes: Vec<_> = [20.0, 45.0, 70.0].map(|deg| plane(&gold, deg, 14)).into();
+    let model = Auto::from_observations(&planes, &arc(&gold, 6, 0.0)).unwrap();
+    assert_eq!(model.chosen(), "planes");
+    let error = |name: &str| {
+        let found = model.errors().iter().find(|(candidate, _)| *candidate == name);
+        found.and_then(|(_, error)| *error).expect("it was tried")
+    };
+    assert!(error("planes") < error("bivariate") && error("planes") < error("separable"));
+    let about = model.about();
+    assert!(
+        about.contains("best predicts each side") && about.contains("separable 0."),
+        "{about}"
+    );
+    // With one side of one plane there is nothing to leave out.
+    let one: Vec<_> = plane(&gold, 30.0, 20)
+        .into_iter()
+        .filter(|o| o.deviation >= 0.0)
+        .collect();
+    let model = Auto::from_observations(&[one], &arc(&gold, 6, 0.0)).unwrap();
+    assert_eq!((model.chosen(), model.errors()[0].1), ("planes", None));
+}
+
+#[test]
 fn its_factors_are_tables() {
     let tables = model(&fitted("gold-paint"), &[30.0, 60.0], 30, 20).factors();
     let names: Vec<_> = tables.iter().map(|t| (t.name, t.variable)).collect();
@@ -414,8 +485,15 @@ proptest! {
         // Shadowing may brighten a lobe by (1/0.03)², and what lies by the floor may be off by a factor of 2.
         let sweeps = [&planes.0, &planes.1, &planes.2, &along];
         let brightest = sweeps.into_iter().flatten().map(|o| o.rgb.max_element()).fold(0.0, f64::max);
-        for (incident, exitant) in pairs.into_iter().chain([(DVec3::Z, DVec3::Z), (DVec3::X, DVec3::NEG_X)]) {
+        let bivariate = Bivariate::from_observations(&[planes.0.clone(), planes.1.clone(), planes.2.clone()], &along)
+            .expect("it needs no more");
+        let grazing = |x: f64| DVec3::new(x, 0.0, 1e-200);
+        let degenerate = [(DVec3::Z, DVec3::Z), (DVec3::X, DVec3::NEG_X), (grazing(1.0), grazing(-1.0))];
+        for (incident, exitant) in pairs.into_iter().chain(degenerate) {
             let f = model.eval(incident, exitant);
+            for other in [bivariate.eval(incident, exitant), model.exact(incident, exitant)] {
+                prop_assert!(other.is_finite() && other.min_element() >= 0.0, "{} at {}, {}", other, incident, exitant);
+            }
             prop_assert!(f.is_finite() && f.min_element() >= 0.0, "{} at {}, {}", f, incident, exitant);
             prop_assert!(f.max_element() <= 2300.0 * brightest, "{} at {}, {}", f, incident, exitant);
         }

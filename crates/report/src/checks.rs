@@ -1,6 +1,6 @@
 use brdf::{Brdf, Spherical};
 use glam::DVec3;
-use pdv::{Model, Observation, albedo};
+use pdv::{Basis, Model, Observation, albedo};
 use serde_json::json;
 
 use crate::{Check, Readings, Run, Verdict};
@@ -137,7 +137,7 @@ pub(crate) fn energy(model: &dyn Brdf) -> Check {
 pub(crate) fn coverage(model: &dyn Model) -> Check {
     let zenith = || (0..80).step_by(4).map(|deg| f64::from(deg + 2).to_radians());
     let azimuth = || (0..180).step_by(10).map(|deg| f64::from(deg + 5).to_radians());
-    let (mut pairs, mut beyond) = (0_u32, 0_u32);
+    let (mut pairs, mut beyond, mut hidden) = (0_u32, 0_u32, 0_u32);
     for (theta_i, theta_o) in zenith().flat_map(|i| zenith().map(move |o| (i, o))) {
         let exitant = Spherical {
             theta: theta_o,
@@ -147,18 +147,21 @@ pub(crate) fn coverage(model: &dyn Model) -> Check {
         for phi in azimuth() {
             let incident = Spherical { theta: theta_i, phi }.direction();
             pairs += 1;
-            beyond += u32::from(model.extrapolated(incident, exitant));
+            let basis = model.basis(incident, exitant);
+            beyond += u32::from(basis == Basis::Extrapolated);
+            hidden += u32::from(basis == Basis::Occluded);
         }
     }
-    let share = f64::from(beyond) / f64::from(pairs);
+    let [share, occluded] = [beyond, hidden].map(|count| f64::from(count) / f64::from(pairs));
     Check {
         name: "coverage",
-        verdict: limit(share, COVERAGE_LIMIT),
+        verdict: limit(share + occluded, COVERAGE_LIMIT),
         text: format!(
-            "{:.1} % of all pairs of directions below 80° lie beyond the measured range of d_p or θ_r and are extrapolated.",
-            100.0 * share
+            "{:.1} % of all pairs of directions below 80° lie beyond the range that was measured and are extrapolated, {:.1} % where the arms hide each other.",
+            100.0 * share,
+            100.0 * occluded
         ),
-        values: json!({ "extrapolated": share }),
+        values: json!({ "extrapolated": share, "occluded": occluded }),
     }
 }
 

@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use brdf::Brdf;
-use pdv::{Model, Observation, Planes, Separable};
+use pdv::{Auto, Bivariate, Model, Observation, Planes, Separable};
 use rig::{Port, RigFile};
 use sweep::{Job, Sweep};
 
@@ -53,6 +53,8 @@ pub fn model(
         }
         sweep::Model::Reciprocal => Box::new(Planes::from_observations(first, arc)?),
         sweep::Model::Planes => Box::new(Planes::from_observations(planes, arc)?),
+        sweep::Model::Bivariate => Box::new(Bivariate::from_observations(planes, arc)?),
+        sweep::Model::Auto => Box::new(Auto::from_observations(planes, arc)?),
     })
 }
 

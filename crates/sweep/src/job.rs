@@ -50,6 +50,10 @@ pub enum Model {
     Reciprocal,
     /// The same of all planes and the arc, interpolated between the planes.
     Planes,
+    /// A table over half and difference angle of all planes and the arc (Romeiro 2008), a baseline.
+    Bivariate,
+    /// Of separable, bivariate and planes the one that best predicts readings from the others.
+    Auto,
 }
 
 impl Model {
@@ -59,6 +63,8 @@ impl Model {
             Self::Separable => "separable",
             Self::Reciprocal => "reciprocal",
             Self::Planes => "planes",
+            Self::Bivariate => "bivariate",
+            Self::Auto => "auto",
         }
     }
 

@@ -1,0 +1,108 @@
+use brdf::Brdf;
+use glam::{DVec3, Vec4};
+
+use crate::bisected::{Bisected, Pair};
+use crate::model::Basis;
+use crate::surface::Surface;
+use crate::sweeps::Sweeps;
+use crate::table::{exp2, logs};
+use crate::{Error, FactorTable, Model, Observation, Shape};
+
+/// Nodes over either angle.
+const NODES: usize = 90;
+/// ln f is what is interpolated: the product of lobe and arc, without floor, shadowing or darkening.
+const PRODUCT: Shape = Shape {
+    scale: 1e6,
+    diffuse: 0.0,
+    shadowing: 1.0,
+    darkening: 0.0,
+};
+
+/// The bivariate baseline: f is taken to depend on half and difference angle alone (Romeiro, Vasilyev, Zickler 2008).
+///
+/// A table of ln f at 90 × 90 nodes, even in √θ_h and in θ_d, from the readings in the plane: along a side they are
+/// interpolated over θ_h, between the sides and the arc over θ_d. Beyond the largest half angle, and where θ_h + θ_d
+/// passes the horizon, it is held.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bivariate {
+    surface: Surface,
+    /// log₂ of RGB, θ_h fastest, and a number that is loaded and not used.
+    logs: Vec<f32>,
+    light: DVec3,
+    dropped: usize,
+}
+
+impl Bivariate {
+    /// The model of planes and an arc; what cannot be used is dropped and counted as for [`crate::Planes`].
+    ///
+    /// # Errors
+    /// As [`crate::Planes::from_observations`].
+    pub fn from_observations(planes: &[Vec<Observation>], arc: &[Observation]) -> Result<Self, Error> {
+        let sweeps = Sweeps::new(planes, arc)?;
+        let surface = Surface::new(&sweeps, PRODUCT)?;
+        let mut nodes = Vec::with_capacity(3 * NODES * NODES + 1);
+        for row in 0..NODES {
+            for column in 0..NODES {
+                let share = |n: usize| n as f64 / (NODES - 1) as f64;
+                let pose = Bisected {
+                    theta_h: share(column).powi(2) * std::f64::consts::FRAC_PI_2,
+                    theta_d: share(row) * std::f64::consts::FRAC_PI_2,
+                };
+                nodes.extend(logs(surface.at(pose, None)).to_array());
+            }
+        }
+        nodes.push(0.0);
+        Ok(Self {
+            surface,
+            logs: nodes,
+            light: sweeps.light(),
+            dropped: sweeps.dropped,
+        })
+    }
+}
+
+impl Brdf for Bivariate {
+    fn eval(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
+        if !(incident.z > 0.0 && exitant.z > 0.0) {
+            return DVec3::ZERO;
+        }
+        let (sum, difference) = (incident + exitant, incident - exitant);
+        let half = (sum.x * sum.x + sum.y * sum.y).sqrt() as f32;
+        let theta_h = half.atan2(sum.z as f32);
+        let theta_d = (difference.length() as f32).atan2(sum.length() as f32);
+        let place = |share: f32| {
+            let place = share.max(0.0).min(1.0) * (NODES - 1) as f32;
+            let cell = (place as usize).min(NODES - 2);
+            (cell, place - cell as f32)
+        };
+        let quarter = std::f32::consts::FRAC_PI_2;
+        let (column, across) = place((theta_h / quarter).sqrt());
+        let (row, along) = place(theta_d / quarter);
+        let near = |row: usize| {
+            let first = 3 * (row * NODES + column);
+            let pair = &self.logs[first..first + 7];
+            let (a, b) = (Vec4::from_slice(&pair[..4]), Vec4::from_slice(&pair[3..]));
+            a + (b - a) * across
+        };
+        let (a, b) = (near(row), near(row + 1));
+        exp2(a + (b - a) * along).truncate().as_dvec3() * self.light
+    }
+}
+
+impl Model for Bivariate {
+    fn basis(&self, incident: DVec3, exitant: DVec3) -> Basis {
+        self.surface.basis(Pair::new(incident, exitant).bisected())
+    }
+
+    fn about(&self) -> String {
+        format!(
+            "the bivariate table over half and difference angle of {} sides of planes and an arc; {} readings dropped",
+            self.surface.lobe.rows().count(),
+            self.dropped
+        )
+    }
+
+    fn factors(&self) -> Vec<FactorTable> {
+        self.surface.factors()
+    }
+}
