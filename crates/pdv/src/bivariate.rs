@@ -71,7 +71,7 @@ impl Brdf for Bivariate {
         let theta_h = half.atan2(sum.z as f32);
         let theta_d = (difference.length() as f32).atan2(sum.length() as f32);
         let place = |share: f32| {
-            let place = share.max(0.0).min(1.0) * (NODES - 1) as f32;
+            let place = share.clamp(0.0, 1.0) * (NODES - 1) as f32;
             let cell = (place as usize).min(NODES - 2);
             (cell, place - cell as f32)
         };

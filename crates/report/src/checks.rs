@@ -107,10 +107,11 @@ pub(crate) fn bus(run: &Run) -> Check {
     }
 }
 
-/// Nothing reflects more than it receives: directional albedo at a few angles.
-pub(crate) fn energy(model: &dyn Brdf) -> Check {
+/// Nothing reflects more than it receives: directional albedo at a few angles, over so many azimuths about the mirror
+/// direction; 1 is enough for a model that is constant along them.
+pub(crate) fn energy(model: &dyn Brdf, azimuths: usize) -> Check {
     let albedos: Vec<(f64, DVec3)> = ALBEDO_DEG
-        .map(|deg| (deg, albedo(model, deg.to_radians())))
+        .map(|deg| (deg, albedo(model, deg.to_radians(), azimuths)))
         .into();
     let worst = albedos.iter().map(|(_, a)| a.max_element()).fold(0.0, f64::max);
     Check {
@@ -195,7 +196,7 @@ mod tests {
 
     #[test]
     fn more_light_out_than_in_is_noticed() {
-        let verdict = |albedo| energy(&brdf::Lambert::new(albedo).unwrap()).verdict;
+        let verdict = |albedo| energy(&brdf::Lambert::new(albedo).unwrap(), 1).verdict;
         assert_eq!(verdict(0.9), Verdict::Good);
         struct Bright;
         impl Brdf for Bright {
@@ -203,7 +204,7 @@ mod tests {
                 DVec3::splat(1.2 / PI)
             }
         }
-        assert_eq!(energy(&Bright).verdict, Verdict::Look);
+        assert_eq!(energy(&Bright, 1).verdict, Verdict::Look);
     }
 
     #[test]

@@ -13,6 +13,9 @@ use crate::{
     write_readings,
 };
 
+/// Azimuths at which the albedo of a model that is not constant along φ_p is taken.
+const AZIMUTHS: usize = 16;
+
 /// report.json: how far the result can be trusted.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
@@ -149,7 +152,10 @@ fn check(run: &Run, job: &Job, sweeps: &Sweeps, model: Option<&dyn Model>) -> Ve
     }
     if let Some(model) = model {
         checks.push(checks::coverage(model));
-        checks.push(checks::energy(model));
+        checks.push(checks::energy(
+            model,
+            if model.phi_p_constant() { 1 } else { AZIMUTHS },
+        ));
     }
     checks
 }

@@ -63,7 +63,7 @@ fn bad_input_is_named_with_line_key_and_range() {
         ),
         (
             format!("{plane}distribution = \"dense\""),
-            "job.toml, line 4: distribution: unknown variant `dense`, expected one of `capped`, `paper`, `uniform`",
+            "job.toml, line 4: distribution: unknown variant `dense`, expected one of `capped`, `paper`, `uniform`, `lobe`",
         ),
         (
             "[[plane]]\ntheta_r_deg = \"70\"\nreadings = 90".to_owned(),
@@ -79,7 +79,7 @@ fn bad_input_is_named_with_line_key_and_range() {
         ),
         (
             format!("{plane}[reconstruction]\nmodel = \"magic\""),
-            "job.toml, line 5: model: unknown variant `magic`, expected one of `separable`, `reciprocal`, `planes`",
+            "job.toml, line 5: model: unknown variant `magic`, expected one of `separable`, `reciprocal`, `planes`, `bivariate`, `auto`",
         ),
     ];
     for (text, expected) in table {

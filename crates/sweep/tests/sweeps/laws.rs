@@ -39,7 +39,7 @@ prop_compose! {
     fn planes()(
         theta_r_deg in 0.0..=85.0_f64,
         readings in 1_usize..120,
-        distribution in prop::sample::select(vec![Distribution::Capped, Distribution::Paper, Distribution::Uniform]),
+        distribution in prop::sample::select(vec![Distribution::Capped, Distribution::Paper, Distribution::Uniform, Distribution::Lobe]),
     ) -> Plane {
         Plane { theta_r: theta_r_deg.to_radians(), readings, distribution }
     }
