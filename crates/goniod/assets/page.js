@@ -291,7 +291,7 @@ async function route() {
     const at = `${API}/runs/${id}/files`;
     $("report-title").textContent = title(run);
     $("report-facts").textContent = `Run ${run.id}, begun ${when(run.started)}, ${run.accepted} of ${run.planned} readings.`;
-    $("report-frame").src = `${at}/report.html`;
+    $("report-frame").src = $("report-alone").href = `${at}/report.html`;
     const files = await ask("GET", `/runs/${id}/files`);
     $("files").replaceChildren(...files.map(({ name, bytes }) =>
       node("li", {}, node("a", { href: `${at}/${name}`, download: name }, name), ` ${size(bytes)}`)));
@@ -352,6 +352,11 @@ addEventListener("keydown", (event) => {
   event.preventDefault();
   estop();
 }, { capture: true });
+
+// A report that was clicked on would keep the keys to itself, that of the emergency stop among them.
+addEventListener("blur", () => setTimeout(() => {
+  if (document.activeElement === $("report-frame")) $("report-title").focus({ preventScroll: true });
+}));
 
 const submitted = (id, run) => $(id).addEventListener("submit", (event) => { event.preventDefault(); run(); });
 submitted("jog-form", () => act("Move", "POST", "/jog", { arm: $("jog-arm").value, angle_deg: $("jog-angle").valueAsNumber }));

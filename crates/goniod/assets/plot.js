@@ -2,7 +2,7 @@
 
 const NS = "http://www.w3.org/2000/svg";
 // In pixels of the page, so that labels stay as large as other text; the width is that of the page's column.
-const HEIGHT = 340, LEFT = 62, TOP = 14, RIGHT = 14, BOTTOM = 46;
+const HEIGHT = 340, LEFT = 62, TOP = 14, RIGHT = 14, BOTTOM = 46, LABEL = 42;
 const CHANNELS = ["r", "g", "b"];
 const DECADES = 6;
 
@@ -16,7 +16,7 @@ export const element = (name, attributes = {}, ...children) => {
 const short = (value) => {
   if (value === 0) return "0";
   const size = Math.abs(value);
-  return size >= 1e-3 && size < 1e4 ? String(Number(value.toPrecision(3))) : value.toExponential(1);
+  return size >= 1e-3 && size < 1e4 ? String(Number(value.toPrecision(3))) : value.toExponential(1).replace(".0e", "e");
 };
 
 // An axis: ends, place of a value (0 … 1), labelled values.
@@ -131,9 +131,13 @@ export class Plot {
       parts.push(element("line", { class: "grid", x1: LEFT, x2: width - RIGHT, y1: py(tick), y2: py(tick) }),
         element("text", { x: LEFT - 6, y: py(tick) + 4, "text-anchor": "end" }, short(tick)));
     }
+    let labelled = -Infinity;
     for (const tick of x.ticks) {
-      parts.push(element("line", { class: "grid", x1: px(tick), x2: px(tick), y1: TOP, y2: HEIGHT - BOTTOM }),
-        element("text", { x: px(tick), y: HEIGHT - BOTTOM + 17, "text-anchor": "middle" }, short(tick)));
+      parts.push(element("line", { class: "grid", x1: px(tick), x2: px(tick), y1: TOP, y2: HEIGHT - BOTTOM }));
+      // Labels must not run into each other where there is little room.
+      if (px(tick) - labelled < LABEL) continue;
+      labelled = px(tick);
+      parts.push(element("text", { x: labelled, y: HEIGHT - BOTTOM + 17, "text-anchor": "middle" }, short(tick)));
     }
     const middle = (TOP + HEIGHT - BOTTOM) / 2;
     parts.push(

@@ -23,14 +23,14 @@ export class Drawing {
       const [[x1, y1], [x2, y2]] = [at(deg, SCALE), at(deg, SCALE + (long ? 5 : 3))];
       scale.append(element("line", { class: "scale", x1, y1, x2, y2 }));
       if (!long) continue;
-      const [x, y] = at(deg, SCALE + 11);
+      const [x, y] = at(deg, SCALE + 14);
       scale.append(element("text", { x, y: y + 2 }, `${deg}°`));
     }
     this.keepOut = element("path", { class: "keep-out" });
     this.limits = element("g");
     this.arms = { light: this.arm("light"), sensor: this.arm("sensor") };
     svg.append(this.keepOut, this.limits, scale,
-      element("line", { class: "bench", x1: -108, x2: 108, y1: 3, y2: 3 }),
+      element("line", { class: "bench", x1: -100, x2: 100, y1: 3, y2: 3 }),
       element("rect", { class: "specimen", x: -14, y: 0, width: 28, height: 3 }),
       this.arms.sensor, this.arms.light);
   }

@@ -9,7 +9,7 @@ use utoipa_axum::router::OpenApiRouter;
 use super::problem::{MEDIA_TYPE, Problem};
 use super::shared::Shared;
 use super::{access, events, jobs, rig, runs, session};
-use crate::Event;
+use crate::{Action, Event};
 
 /// Path of the API; its version changes with what a client could notice.
 pub(crate) const API: &str = "/api/v1";
@@ -35,7 +35,7 @@ const REFUSALS: [(&str, &str); 7] = [
         description = "A gonio-reflectometer with two arms: its queue, its runs, and the hands that stop it. \
             Errors are RFC 9457 problem documents."
     ),
-    components(schemas(Problem, Event)),
+    components(schemas(Problem, Event, Action)),
     tags(
         (name = "rig", description = "The arms, and the hands that stop them"),
         (name = "queue", description = "Jobs, in the order in which they are worked off"),
