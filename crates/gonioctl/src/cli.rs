@@ -2,11 +2,12 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use goniod::JobId;
 
 /// Measures how a flat specimen reflects light, with two servo arms and a photometer.
 ///
 /// Data goes to stdout, talk to stderr. Exit codes: 0 done; 2 bad arguments, config or file; 3 rig fault or missing
-/// device; 4 stopped before the end, resumable, also a full disk.
+/// device; 4 stopped before the end, resumable, also a full disk; 5 the daemon cannot be reached, or refuses.
 #[derive(Debug, Parser)]
 #[command(name = "gonioctl", version, max_term_width = 100)]
 pub(crate) struct Cli {
@@ -29,6 +30,16 @@ pub(crate) enum Command {
         /// Where run directories are to go; its disk is looked at.
         #[arg(long, value_name = "DIR", default_value = "runs")]
         out: PathBuf,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// Try whether the rig behaves as this program expects of it. Moves the arms: stand by.
+    Conform {
+        #[command(flatten)]
+        rig: RigArgument,
+        /// Restart the servos too: their arms have no torque meanwhile.
+        #[arg(long)]
+        restart: bool,
         #[command(flatten)]
         output: Output,
     },
@@ -59,6 +70,108 @@ pub(crate) enum Command {
     },
     /// Measure a standard that lies on the stage, and store what it says of the rig. The arms move.
     Calibrate(CalibrateArguments),
+    /// Add a job to the daemon's queue; prints its id.
+    Submit {
+        /// The job file.
+        job: PathBuf,
+        #[command(flatten)]
+        daemon: DaemonArguments,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// List the jobs that are not over.
+    Jobs {
+        /// Those that are over too.
+        #[arg(long)]
+        all: bool,
+        #[command(flatten)]
+        daemon: DaemonArguments,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// Say that a job's specimen is on the stage: it starts.
+    Ready {
+        /// Id of the job; the one that waits for its specimen unless given.
+        job: Option<JobId>,
+        #[command(flatten)]
+        daemon: DaemonArguments,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// Show live what happens: of one job until it ends, else until Ctrl-C.
+    Watch {
+        /// Id of the job.
+        job: Option<JobId>,
+        #[command(flatten)]
+        daemon: DaemonArguments,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// Finish the reading, then hold.
+    Pause {
+        #[command(flatten)]
+        daemon: DaemonArguments,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// Go on after a pause, or with a job that was interrupted.
+    Resume {
+        /// Id of the job; what is paused, else the interrupted one, unless given.
+        job: Option<JobId>,
+        #[command(flatten)]
+        daemon: DaemonArguments,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// Brake now, hold the arms, lamp off; the job can be resumed.
+    Stop {
+        #[command(flatten)]
+        daemon: DaemonArguments,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// Emergency stop: arms and lamp at once, and no motion until it is acknowledged.
+    Estop {
+        #[command(flatten)]
+        daemon: DaemonArguments,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// Acknowledge a fault: somebody has looked at the rig.
+    Acknowledge {
+        #[command(flatten)]
+        daemon: DaemonArguments,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// Give a job up.
+    Cancel {
+        /// Id of the job.
+        job: JobId,
+        #[command(flatten)]
+        daemon: DaemonArguments,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// Move one arm by hand, within the envelope.
+    Jog {
+        /// Which arm.
+        arm: ArmName,
+        /// Where to, degrees from the normal, positive towards +x.
+        #[arg(allow_negative_numbers = true, value_name = "DEGREES")]
+        angle_deg: f64,
+        #[command(flatten)]
+        daemon: DaemonArguments,
+        #[command(flatten)]
+        output: Output,
+    },
+    /// Take both arms to rest.
+    Park {
+        #[command(flatten)]
+        daemon: DaemonArguments,
+        #[command(flatten)]
+        output: Output,
+    },
     /// Make everything in a run directory again from its journal, or from the store of the daemon that captured it.
     Reconstruct {
         /// The run directory.
@@ -157,6 +270,31 @@ pub(crate) struct RigArgument {
     /// The rig file; config/rig.toml here unless given, else the built-in one.
     #[arg(long, value_name = "RIG.toml", global = true)]
     pub(crate) rig: Option<PathBuf>,
+}
+
+/// Which daemon.
+#[derive(Debug, Args)]
+pub(crate) struct DaemonArguments {
+    /// Where the daemon listens: http://HOST:PORT or unix:PATH.
+    #[arg(
+        long,
+        value_name = "ADDRESS",
+        env = "GONIOD_URL",
+        default_value = "http://127.0.0.1:4664"
+    )]
+    pub(crate) daemon: String,
+    /// File with a token, where the daemon wants one: the token alone, or the daemon's tokens.toml.
+    #[arg(long, value_name = "FILE", env = "GONIOD_TOKEN_FILE")]
+    pub(crate) token_file: Option<PathBuf>,
+}
+
+/// One of the arms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ArmName {
+    /// The one that carries the light.
+    Light,
+    /// The one that carries the sensor.
+    Sensor,
 }
 
 /// How results are printed.

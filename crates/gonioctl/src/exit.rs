@@ -4,6 +4,8 @@ use std::process::ExitCode;
 
 use goniod::Status;
 
+use crate::daemon::ClientError;
+
 /// Exit code of a finished command.
 pub(crate) fn code(status: Status) -> ExitCode {
     ExitCode::from(status.code())
@@ -19,6 +21,12 @@ pub(crate) fn failure(error: &anyhow::Error) -> (ExitCode, String) {
 fn status(error: &(dyn Error + 'static)) -> Option<Status> {
     if let Some(error) = error.downcast_ref::<goniod::DaemonError>() {
         return Some(error.status());
+    }
+    if let Some(error) = error.downcast_ref::<ClientError>() {
+        return Some(match error {
+            ClientError::Refused(refused) if refused.invalid() => Status::Invalid,
+            _ => Status::Daemon,
+        });
     }
     let io = error.downcast_ref::<io::Error>()?;
     report::is_full(io).then_some(Status::Stopped)

@@ -4,24 +4,35 @@
 
 mod calibrate;
 mod cli;
+mod conform;
+mod daemon;
 mod doctor;
 mod eval;
 mod exit;
 mod export;
+mod findings;
+mod hands;
 mod manual;
 mod plan;
 mod ports;
 mod print;
 mod progress;
+mod queue;
 mod reconstruct;
 mod run;
+mod screen;
 mod signals;
 mod study;
+mod watch;
+mod wired;
 
 use std::process::ExitCode;
 
+use arms::{Arm, ArmAngle};
 use clap::Parser;
-use cli::{Cli, Command};
+use cli::{ArmName, Cli, Command, DaemonArguments, Output};
+use daemon::Daemon;
+use hands::Hand;
 use run::Task;
 use tracing_subscriber::EnvFilter;
 
@@ -45,6 +56,9 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Ports { output } => ports::ports(output.json)?,
         Command::Doctor { rig, out, output } => return doctor::doctor(rig.rig.as_deref(), &out, output.json),
+        Command::Conform { rig, restart, output } => {
+            return conform::conform(rig.rig.as_deref(), restart, output.json);
+        }
         Command::Plan { job, rig, output } => plan::plan(&job, rig.rig.as_deref(), output.json)?,
         Command::Run {
             job,
@@ -71,6 +85,31 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             return run::run(&task, output.json);
         }
         Command::Calibrate(arguments) => return calibrate::calibrate(&arguments),
+        Command::Submit { job, daemon, output } => queue::submit(&Daemon::new(&daemon)?, &job, output.json)?,
+        Command::Jobs { all, daemon, output } => queue::jobs(&Daemon::new(&daemon)?, all, output.json)?,
+        Command::Ready { job, daemon, output } => queue::ready(&Daemon::new(&daemon)?, job, output.json)?,
+        Command::Watch { job, daemon, output } => {
+            return watch::watch(&Daemon::new(&daemon)?, job, output.json);
+        }
+        Command::Pause { daemon, output } => return lay(Hand::Pause, &daemon, output),
+        Command::Resume { job, daemon, output } => queue::resume(&Daemon::new(&daemon)?, job, output.json)?,
+        Command::Stop { daemon, output } => return lay(Hand::Stop, &daemon, output),
+        Command::Estop { daemon, output } => return lay(Hand::Estop, &daemon, output),
+        Command::Acknowledge { daemon, output } => return lay(Hand::Acknowledge, &daemon, output),
+        Command::Cancel { job, daemon, output } => queue::cancel(&Daemon::new(&daemon)?, job, output.json)?,
+        Command::Jog {
+            arm,
+            angle_deg,
+            daemon,
+            output,
+        } => {
+            let arm = match arm {
+                ArmName::Light => Arm::Light,
+                ArmName::Sensor => Arm::Sensor,
+            };
+            return lay(Hand::Jog(arm, ArmAngle::from_deg(angle_deg)), &daemon, output);
+        }
+        Command::Park { daemon, output } => return lay(Hand::Park, &daemon, output),
         Command::Export { run, format, to } => export::export(&run, format, to.as_deref())?,
         Command::Eval {
             truth,
@@ -83,4 +122,8 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
         Command::Reconstruct { run, output } => reconstruct::reconstruct(run, output.json)?,
     }
     Ok(ExitCode::SUCCESS)
+}
+
+fn lay(hand: Hand, daemon: &DaemonArguments, output: Output) -> anyhow::Result<ExitCode> {
+    hand.lay_on(&Daemon::new(daemon)?, output.json)
 }

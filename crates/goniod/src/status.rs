@@ -12,6 +12,8 @@ pub enum Status {
     Rig = 3,
     /// Stopped before the end, or the disk is full: can be resumed.
     Stopped = 4,
+    /// The daemon cannot be reached, or refuses.
+    Daemon = 5,
 }
 
 impl Status {

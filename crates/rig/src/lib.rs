@@ -6,6 +6,7 @@
 mod actuator;
 mod axis;
 mod calibration;
+pub mod conform;
 mod detector;
 pub mod doctor;
 mod drive;

@@ -48,7 +48,7 @@ pub struct Bin {
 }
 
 impl Finding {
-    pub(super) fn ok(check: &'static str, text: impl Into<String>) -> Self {
+    pub(crate) fn ok(check: &'static str, text: impl Into<String>) -> Self {
         Self {
             check,
             verdict: Verdict::Ok,
@@ -58,7 +58,7 @@ impl Finding {
         }
     }
 
-    pub(super) fn warn(check: &'static str, text: impl Into<String>, remedy: impl Into<String>) -> Self {
+    pub(crate) fn warn(check: &'static str, text: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
             verdict: Verdict::Warn,
             remedy: Some(remedy.into()),
@@ -66,7 +66,7 @@ impl Finding {
         }
     }
 
-    pub(super) fn fail(check: &'static str, text: impl Into<String>, remedy: impl Into<String>) -> Self {
+    pub(crate) fn fail(check: &'static str, text: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
             verdict: Verdict::Fail,
             ..Self::warn(check, text, remedy)
@@ -74,7 +74,7 @@ impl Finding {
     }
 
     /// A failure whose text, with all its causes, says what to do.
-    pub(super) fn error(check: &'static str, error: &dyn std::error::Error) -> Self {
+    pub(crate) fn error(check: &'static str, error: &dyn std::error::Error) -> Self {
         let mut text = error.to_string();
         let mut cause = error.source();
         while let Some(error) = cause {

@@ -64,8 +64,8 @@ impl Host {
         let remedy = if mode & 0o060 == 0o060 && metadata.gid() != 0 {
             format!("`sudo usermod -aG {group} $USER`, then log in again")
         } else {
-            "udev rule: SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"0403\", MODE=\"0660\", GROUP=\"dialout\"; \
-             `sudo udevadm control --reload && sudo udevadm trigger`"
+            "udev rule (config/udev/70-goniod.rules): SUBSYSTEM==\"tty\", ATTRS{idVendor}==\"0403\", MODE=\"0660\", \
+             GROUP=\"dialout\"; `sudo udevadm control --reload && sudo udevadm trigger`"
                 .to_owned()
         };
         Finding::fail("permission", text, remedy)
@@ -160,7 +160,9 @@ impl Host {
         }
         let rule =
             "ACTION==\"add\", SUBSYSTEM==\"usb-serial\", DRIVER==\"ftdi_sio\", ATTR{latency_timer}=\"1\"";
-        let remedy = format!("now: `echo 1 | sudo tee {file}`; for good, as udev rule: {rule}");
+        let remedy = format!(
+            "now: `echo 1 | sudo tee {file}`; for good, as udev rule (config/udev/70-goniod.rules): {rule}"
+        );
         Finding::warn(CHECK, text, remedy)
     }
 }

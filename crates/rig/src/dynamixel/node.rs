@@ -8,6 +8,7 @@ use crate::{Device, RigError};
 pub(super) mod instruction {
     pub(crate) const READ: u8 = 0x02;
     pub(crate) const WRITE: u8 = 0x03;
+    pub(crate) const REBOOT: u8 = 0x08;
     pub(crate) const SYNC_WRITE: u8 = 0x83;
     pub(crate) const BULK_READ: u8 = 0x92;
 }
@@ -59,6 +60,11 @@ impl Node {
         let mut parameters = register.address.to_le_bytes().to_vec();
         parameters.extend(bytes);
         self.request(instruction::WRITE, parameters, 0).await
+    }
+
+    /// Restarts the device, also one that is ill.
+    pub(super) async fn reboot(&self) -> Result<(), RigError> {
+        self.request(instruction::REBOOT, Vec::new(), 0).await.map(drop)
     }
 
     async fn request(&self, instruction: u8, parameters: Vec<u8>, count: usize) -> Result<Reply, RigError> {

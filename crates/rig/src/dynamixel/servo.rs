@@ -15,6 +15,9 @@ const STILL: i32 = 12;
 /// First firmware with the bus watchdog and the drive mode register as used here (e-manual, "Bus Watchdog(98)").
 const FIRMWARE_MIN: u8 = 38;
 
+/// Value of Bus Watchdog once it has tripped (e-manual, "Bus Watchdog(98)").
+const TRIPPED: u8 = 255;
+
 /// Homing offsets beyond this are ignored in position mode (e-manual, "Homing Offset(20)").
 const HOMING_OFFSET_MAX: i32 = 1024;
 
@@ -96,6 +99,19 @@ impl Servo {
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
         let position = f64::from(position);
         Ok(goal.clamp(low.min(position), high.max(position)) as i32)
+    }
+
+    /// Whether the bus watchdog has tripped.
+    pub(crate) async fn watchdog_tripped(&self) -> Result<bool, RigError> {
+        let watchdog = self.node.ask(Block::of(common::BUS_WATCHDOG)).await?;
+        Ok(watchdog.parameters[0] == TRIPPED)
+    }
+
+    /// Restarts the servo: it answers, then is deaf for a while, and has no torque and no profile afterwards.
+    pub(crate) async fn reboot(&mut self) -> Result<(), RigError> {
+        self.engaged = false;
+        self.mapped = false;
+        self.node.reboot().await
     }
 
     /// Everything about the servo that differs from the rig file, each with what to do about it.

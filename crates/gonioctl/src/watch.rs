@@ -1,0 +1,112 @@
+use std::process::ExitCode;
+use std::time::Duration;
+
+use goniod::{Job, JobId, JobState, Status};
+use serde_json::Value;
+
+use crate::daemon::{ClientError, Daemon, Stream};
+use crate::exit;
+use crate::screen::Screen;
+
+/// Between two attempts to reach a daemon that was lost.
+const PAUSE: Duration = Duration::from_secs(1);
+
+/// Shows live what happens; of one job until it ends, else until it is interrupted. A daemon that is lost is looked
+/// for until it is back, and the events go on where they were.
+///
+/// # Errors
+/// The daemon does not answer from the first, or refuses.
+pub(crate) fn watch(daemon: &Daemon, job: Option<JobId>, as_json: bool) -> anyhow::Result<ExitCode> {
+    let mut stream = daemon.events(None)?;
+    let mut watcher = Watcher {
+        daemon,
+        job,
+        last: None,
+        screen: Screen::new(as_json),
+    };
+    watcher.screen.say("watching");
+    loop {
+        match watcher.follow(&mut stream) {
+            Ok(Some(job)) => {
+                watcher.screen.finish();
+                return Ok(exit::code(watcher.status(&job)?));
+            }
+            Ok(None) | Err(ClientError::Unreachable { .. }) => {}
+            Err(error) => return Err(error.into()),
+        }
+        watcher.screen.say("lost the daemon; looking for it");
+        stream = watcher.again()?;
+        watcher.screen.say("the daemon is back");
+    }
+}
+
+struct Watcher<'a> {
+    daemon: &'a Daemon,
+    job: Option<JobId>,
+    /// Id of the event that was seen last.
+    last: Option<u64>,
+    screen: Screen,
+}
+
+impl Watcher<'_> {
+    /// Shows events until the job has ended, which is returned, or the stream has.
+    fn follow(&mut self, stream: &mut Stream) -> Result<Option<Job>, ClientError> {
+        if let Some(id) = self.job {
+            // It may have ended before the stream began.
+            let job: Job = self.daemon.read(&format!("/jobs/{id}"))?;
+            self.screen.job(&job);
+            if ended(job.state) {
+                return Ok(Some(job));
+            }
+        }
+        // A broken stream is a lost daemon, like one that ended.
+        while let Ok(Some(told)) = stream.next() {
+            self.last = told.id.or(self.last);
+            let Ok(event) = serde_json::from_str::<Value>(&told.data) else {
+                tracing::warn!(data = told.data, "an event that is no JSON");
+                continue;
+            };
+            self.screen.show(&event);
+            let job: Option<Job> = event
+                .get("job")
+                .cloned()
+                .and_then(|job| serde_json::from_value(job).ok());
+            if let Some(job) = job.filter(|job| Some(job.id) == self.job && ended(job.state)) {
+                return Ok(Some(job));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The stream, once the daemon answers again.
+    fn again(&self) -> Result<Stream, ClientError> {
+        loop {
+            match self.daemon.events(self.last) {
+                Err(ClientError::Unreachable { .. }) => std::thread::sleep(PAUSE),
+                other => return other,
+            }
+        }
+    }
+
+    /// How the command ends when its job has.
+    fn status(&self, job: &Job) -> Result<Status, ClientError> {
+        Ok(match job.state {
+            JobState::Done => Status::Done,
+            JobState::Failed => Status::Invalid,
+            JobState::Interrupted => {
+                let rig: Value = self.daemon.read("/rig")?;
+                if rig["fault"].is_null() {
+                    Status::Stopped
+                } else {
+                    Status::Rig
+                }
+            }
+            _ => Status::Stopped,
+        })
+    }
+}
+
+/// Whether nothing more happens to a job by itself.
+fn ended(state: JobState) -> bool {
+    state.over() || state == JobState::Interrupted
+}

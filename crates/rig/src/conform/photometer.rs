@@ -1,0 +1,128 @@
+use super::Result;
+use crate::doctor::Finding;
+use crate::{Counts, Drive, Dynamixel, Exposure, Gain};
+
+/// Dark readings at each gain.
+const READINGS: usize = 16;
+
+/// Noise, of full scale, that leaves nothing to be measured.
+const NOISE_MAX: f64 = 0.01;
+
+/// Exposures that are compared, each twice as long as the one before.
+const DOUBLINGS: u32 = 6;
+
+/// Deviation from proportion to time that is worth a correction, and one that no correction mends.
+const BENT: f64 = 0.01;
+const BROKEN: f64 = 0.1;
+
+/// Share of full scale that the longest exposure may fill.
+const FULL: f64 = 0.8;
+
+/// Standard deviation of dark readings at each gain.
+pub(super) async fn noise(drive: &mut Drive<Dynamixel>) -> Result<Vec<Finding>> {
+    let settings = drive.file().photometer.clone();
+    let integration_us = 1000.clamp(settings.integration_min_us, settings.integration_max_us);
+    drive.lamp(false).await?;
+    let mut findings = Vec::new();
+    for (gain, check) in Gain::ALL.into_iter().zip(["dark ×1", "dark ×16", "dark ×256"]) {
+        let mut red = Vec::with_capacity(READINGS);
+        for _ in 0..READINGS {
+            let counts = drive.expose(Exposure { integration_us, gain }).await?;
+            red.push(f64::from(counts.rgb[0]));
+        }
+        let mean = red.iter().sum::<f64>() / READINGS as f64;
+        let variance = red.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / (READINGS - 1) as f64;
+        let text = format!(
+            "{mean:.1} ± {:.2} counts in {integration_us} µs, red",
+            variance.sqrt()
+        );
+        let limit = NOISE_MAX * f64::from(settings.full_scale);
+        findings.push(if variance.sqrt() > limit {
+            Finding::fail(
+                check,
+                text,
+                "more than a hundredth of full scale: light, hum, or a broken amplifier",
+            )
+        } else {
+            Finding::ok(check, text)
+        });
+    }
+    Ok(findings)
+}
+
+/// Whether the counts of every channel grow in proportion to the integration time; the lamp is on.
+pub(super) async fn linearity(drive: &mut Drive<Dynamixel>) -> Result<Finding> {
+    const CHECK: &str = "linearity";
+    let settings = drive.file().photometer.clone();
+    drive.wait(settings.lamp_warm_up).await?;
+    let gain = Gain::X1;
+    let integration_us = settings.integration_min_us;
+    let probe = drive.expose(Exposure { integration_us, gain }).await?;
+    let brightest = channels(&probe).into_iter().fold(1.0, f64::max);
+    let full = FULL * f64::from(settings.full_scale);
+    let longest_us =
+        (f64::from(integration_us) * full / brightest).min(f64::from(settings.integration_max_us));
+    let mut taken: Vec<Counts> = Vec::new();
+    for halving in (0..DOUBLINGS).rev() {
+        let integration_us = (longest_us / f64::from(1 << halving)) as u32;
+        if integration_us >= settings.integration_min_us {
+            taken.push(drive.expose(Exposure { integration_us, gain }).await?);
+        }
+    }
+    let [Some(first), Some(last)] = [taken.first(), taken.last()] else {
+        return Ok(Finding::warn(
+            CHECK,
+            "no exposure fits the range",
+            "correct [photometer]",
+        ));
+    };
+    let telling = |&channel: &usize| channels(last)[channel] >= f64::from(settings.enough);
+    let worst = (0..4)
+        .filter(telling)
+        .map(|channel| bend(&taken, channel))
+        .fold(0.0, f64::max);
+    let text = format!(
+        "over {} … {} µs, at most {:.2} % off proportion",
+        first.exposure.integration_us,
+        last.exposure.integration_us,
+        100.0 * worst
+    );
+    Ok(if worst <= BENT {
+        Finding::ok(CHECK, text)
+    } else if worst <= BROKEN {
+        Finding::warn(
+            CHECK,
+            text,
+            "calibrate the linearity, or use less of the range (photometer.aim)",
+        )
+    } else {
+        Finding::fail(
+            CHECK,
+            text,
+            "the lamp flickers, the photometer saturates, or the integration times are not true",
+        )
+    })
+}
+
+/// Red, green, blue, monitor.
+fn channels(counts: &Counts) -> [f64; 4] {
+    let [r, g, b] = counts.rgb.map(f64::from);
+    [r, g, b, f64::from(counts.monitor)]
+}
+
+/// Largest relative deviation of one channel's slope between two exposures from that over all of them. Slopes, so that
+/// what is there without light and time does not matter.
+fn bend(taken: &[Counts], channel: usize) -> f64 {
+    let slope = |a: &Counts, b: &Counts| {
+        let time = f64::from(b.exposure.integration_us) - f64::from(a.exposure.integration_us);
+        (channels(b)[channel] - channels(a)[channel]) / time
+    };
+    let (Some(first), Some(last)) = (taken.first(), taken.last()) else {
+        return 0.0;
+    };
+    let whole = slope(first, last);
+    let deviations = taken
+        .windows(2)
+        .map(|pair| (slope(&pair[0], &pair[1]) / whole - 1.0).abs());
+    deviations.fold(0.0, f64::max)
+}

@@ -1,0 +1,294 @@
+//! The verbs that work on a daemon, through both executables.
+
+// The exemption for tests does not reach what they share.
+#![allow(clippy::unwrap_used)]
+
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, ChildStderr, ChildStdout, Command, Stdio};
+
+use serde_json::Value;
+use tempfile::TempDir;
+use tests::{Finished, run};
+
+const GONIOCTL: &str = env!("CARGO_BIN_EXE_e2e-gonioctl");
+const GONIOD: &str = env!("CARGO_BIN_EXE_e2e-goniod");
+
+const SHORT: &str =
+    "specimen = \"short\"\n[[plane]]\ntheta_r_deg = 70.0\nreadings = 10\n[arc]\nreadings = 10\n";
+/// Long enough not to be over before it is stopped.
+const LONG: &str = "specimen = \"long\"\non_stage = true\n[[plane]]\ntheta_r_deg = 70.0\nreadings = 400\n[arc]\nreadings = 400\n";
+
+/// A daemon on the built-in simulator, in a directory of its own; killed when dropped.
+struct Service {
+    directory: TempDir,
+    child: Child,
+    address: String,
+}
+
+impl Service {
+    fn start(arguments: &[&str]) -> Self {
+        let directory = tempfile::tempdir().unwrap();
+        for (name, text) in [("rig.toml", ""), ("short.toml", SHORT), ("long.toml", LONG)] {
+            fs::write(directory.path().join(name), text).unwrap();
+        }
+        let (child, address) = launch(directory.path(), arguments);
+        Self {
+            directory,
+            child,
+            address,
+        }
+    }
+
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new(GONIOCTL);
+        command
+            .args(arguments)
+            .current_dir(self.directory.path())
+            .env("GONIOD_URL", &self.address)
+            .env_remove("RUST_LOG");
+        command
+    }
+
+    fn gonioctl(&self, arguments: &[&str]) -> Finished {
+        self.command(arguments).output().unwrap().into()
+    }
+
+    /// Submits a job file and returns its id.
+    fn submit(&self, file: &str) -> String {
+        self.gonioctl(&["submit", file])
+            .expect(0)
+            .stdout
+            .trim()
+            .to_owned()
+    }
+
+    fn rig(&self, arguments: &[&str]) -> Value {
+        let told = self.gonioctl(&[arguments, &["--json"]].concat()).expect(0);
+        serde_json::from_str(&told.stdout).unwrap()
+    }
+}
+
+impl Drop for Service {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Starts a daemon and returns it with its address, once it answers.
+fn launch(directory: &Path, arguments: &[&str]) -> (Child, String) {
+    let log = File::create(directory.join("log")).unwrap();
+    let mut child = Command::new(GONIOD)
+        .args(["--config", "rig.toml", "--data", "data"])
+        .args(arguments)
+        .current_dir(directory)
+        .stdout(Stdio::piped())
+        .stderr(log)
+        .spawn()
+        .unwrap();
+    let mut address = String::new();
+    let mut stdout = BufReader::new(child.stdout.take().unwrap());
+    stdout.read_line(&mut address).unwrap();
+    let log = || fs::read_to_string(directory.join("log")).unwrap();
+    assert!(!address.is_empty(), "the daemon did not start: {}", log());
+    (child, address.trim().to_owned())
+}
+
+/// A `gonioctl watch --json`, whose events are read as they come.
+struct Watcher {
+    child: Child,
+    lines: BufReader<ChildStdout>,
+}
+
+impl Watcher {
+    fn of(service: &Service, job: &str) -> Self {
+        let mut child = service
+            .command(&["watch", job, "--json"])
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let lines = BufReader::new(child.stdout.take().unwrap());
+        Self { child, lines }
+    }
+
+    /// Reads until an event is told of which this holds.
+    fn until(&mut self, what: &str, holds: impl Fn(&Value) -> bool) {
+        let mut line = String::new();
+        loop {
+            line.clear();
+            assert!(
+                self.lines.read_line(&mut line).unwrap() > 0,
+                "it ended before: {what}"
+            );
+            if holds(&serde_json::from_str(&line).unwrap()) {
+                return;
+            }
+        }
+    }
+
+    fn state(&mut self, state: &str) {
+        self.until(state, |event| event["job"]["state"] == state);
+    }
+
+    fn readings(&mut self, count: u64) {
+        self.until("readings", |event| {
+            event["progress"]["done"]
+                .as_u64()
+                .is_some_and(|done| done >= count)
+        });
+    }
+
+    fn code(mut self) -> i32 {
+        // To its end, or it would wait for us to read.
+        std::io::copy(&mut self.lines, &mut std::io::sink()).unwrap();
+        self.child.wait().unwrap().code().unwrap()
+    }
+}
+
+#[test]
+fn a_specimen_is_submitted_laid_on_the_stage_and_watched_to_its_end() {
+    let service = Service::start(&["--listen", "127.0.0.1:0"]);
+    let told = service.gonioctl(&["jobs"]).expect(0);
+    assert!(told.stderr.contains("no job"), "{}", told.stderr);
+    let id = service.submit("short.toml");
+    let listed = service.gonioctl(&["jobs"]).expect(0).stdout;
+    assert!(listed.contains(&id) && listed.contains("short"), "{listed}");
+    let _ = service.gonioctl(&["ready", &id]).expect(0);
+    let watched = service.gonioctl(&["watch", &id]).expect(0);
+    assert!(
+        watched.stderr.contains(&format!("{id} short: done")),
+        "{}",
+        watched.stderr
+    );
+    let listed = service.gonioctl(&["jobs"]).expect(0).stdout;
+    assert!(!listed.contains(&id), "what is over is not listed: {listed}");
+    let all: Value =
+        serde_json::from_str(&service.gonioctl(&["jobs", "--all", "--json"]).expect(0).stdout).unwrap();
+    assert_eq!(all[0]["state"], "done");
+}
+
+#[test]
+fn a_run_is_paused_stopped_and_gone_on_with() {
+    let service = Service::start(&["--listen", "127.0.0.1:0"]);
+    let id = service.submit("long.toml");
+    let mut watcher = Watcher::of(&service, &id);
+    watcher.readings(20);
+    let _ = service.gonioctl(&["pause"]).expect(0);
+    watcher.state("paused");
+    let _ = service.gonioctl(&["resume"]).expect(0);
+    watcher.state("running");
+    let _ = service.gonioctl(&["stop"]).expect(0);
+    watcher.state("interrupted");
+    assert_eq!(watcher.code(), 4, "stopped before the end");
+    let _ = service.gonioctl(&["resume"]).expect(0);
+    let _ = service.gonioctl(&["watch", &id]).expect(0);
+    let refused = service.gonioctl(&["resume"]).expect(5);
+    assert!(refused.stderr.contains("nothing is paused"), "{}", refused.stderr);
+}
+
+#[test]
+fn an_emergency_stop_is_latched_until_it_is_acknowledged() {
+    let service = Service::start(&["--listen", "127.0.0.1:0"]);
+    let id = service.submit("long.toml");
+    let mut watcher = Watcher::of(&service, &id);
+    watcher.readings(20);
+    let _ = service.gonioctl(&["estop"]).expect(0);
+    watcher.state("interrupted");
+    assert_eq!(watcher.code(), 3, "ended by a fault");
+    let refused = service.gonioctl(&["park"]).expect(5);
+    assert!(refused.stderr.contains("acknowledge"), "{}", refused.stderr);
+    let rig = service.rig(&["acknowledge"]);
+    assert!(rig["fault"].is_null(), "{rig:#}");
+    let _ = service.gonioctl(&["acknowledge"]).expect(5);
+    let _ = service.gonioctl(&["cancel", &id]).expect(0);
+}
+
+#[test]
+fn arms_go_by_hand_within_the_envelope() {
+    let service = Service::start(&["--listen", "127.0.0.1:0"]);
+    let angle = |rig: &Value, arm: usize| rig["arms"][arm]["measured_deg"].as_f64().unwrap();
+    let rig = service.rig(&["jog", "light", "-40"]);
+    assert!((angle(&rig, 0) + 40.0).abs() < 0.2, "{rig:#}");
+    let outside = service.gonioctl(&["jog", "light", "-89.5"]).expect(2);
+    assert!(outside.stderr.contains("-88"), "{}", outside.stderr);
+    let _ = service.gonioctl(&["jog", "lamp", "10"]).expect(2);
+    let rig = service.rig(&["park"]);
+    assert!((angle(&rig, 0) + 45.0).abs() < 0.2, "{rig:#}");
+}
+
+#[test]
+fn what_is_wrong_is_told_and_has_its_exit_code() {
+    let here = tempfile::tempdir().unwrap();
+    let nobody = run(GONIOCTL, here.path(), &["jobs", "--daemon", "http://127.0.0.1:1"]).expect(5);
+    assert!(
+        nobody
+            .stderr
+            .contains("cannot reach the daemon at http://127.0.0.1:1"),
+        "{}",
+        nobody.stderr
+    );
+    let _ = run(GONIOCTL, here.path(), &["jobs", "--daemon", "ftp://here"]).expect(2);
+
+    let service = Service::start(&["--listen", "127.0.0.1:0"]);
+    fs::write(
+        service.directory.path().join("bad.toml"),
+        "[[plane]]\ntheta_r_deg = 95.0\nreadings = 10\n[arc]\nreadings = 10\n",
+    )
+    .unwrap();
+    let bad = service.gonioctl(&["submit", "bad.toml"]).expect(2);
+    assert!(
+        bad.stderr.contains("bad.toml") && bad.stderr.contains("theta_r_deg"),
+        "{}",
+        bad.stderr
+    );
+    let _ = service.gonioctl(&["submit", "none.toml"]).expect(2);
+    let _ = service.gonioctl(&["cancel", "no-id"]).expect(2);
+    let _ = service
+        .gonioctl(&["cancel", "01KAGN4Z7Q3X9V5T8R2M6C1D0B"])
+        .expect(5);
+    let _ = service.gonioctl(&["pause"]).expect(5);
+    let _ = service.gonioctl(&["ready"]).expect(5);
+}
+
+#[test]
+fn a_token_is_needed_where_the_daemon_wants_one() {
+    let service = Service::start(&["--listen", "127.0.0.1:0", "--tokens", "tokens.toml"]);
+    let refused = service.gonioctl(&["jobs"]).expect(5);
+    assert!(refused.stderr.contains("--token-file"), "{}", refused.stderr);
+    let _ = service
+        .gonioctl(&["jobs", "--token-file", "tokens.toml"])
+        .expect(0);
+    let _ = service.gonioctl(&["jobs", "--token-file", "missing"]).expect(2);
+}
+
+#[test]
+fn a_watcher_finds_a_daemon_that_was_killed_and_started_again() {
+    let mut service = Service::start(&["--listen", "unix:socket"]);
+    let _ = service.gonioctl(&["jobs"]).expect(0);
+    let mut watcher = service
+        .command(&["watch"])
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut said = BufReader::new(watcher.stderr.take().unwrap());
+    until(&mut said, "watching");
+    service.child.kill().unwrap();
+    service.child.wait().unwrap();
+    until(&mut said, "lost the daemon");
+    (service.child, service.address) = launch(service.directory.path(), &["--listen", "unix:socket"]);
+    until(&mut said, "the daemon is back");
+    let id = service.submit("short.toml");
+    until(&mut said, &id);
+    watcher.kill().unwrap();
+    watcher.wait().unwrap();
+}
+
+fn until(said: &mut BufReader<ChildStderr>, what: &str) {
+    let mut line = String::new();
+    while !line.contains(what) {
+        line.clear();
+        assert!(said.read_line(&mut line).unwrap() > 0, "it ended before: {what}");
+    }
+}
