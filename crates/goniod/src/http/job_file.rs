@@ -38,7 +38,6 @@ struct PlaneTable {
     readings: u32,
     /// How d_p is distributed.
     #[serde(default)]
-    #[schema(inline)]
     distribution: DistributionName,
 }
 
@@ -63,7 +62,6 @@ struct ArcTable {
 struct ReconstructionTable {
     /// Which model.
     #[serde(default)]
-    #[schema(inline)]
     model: ModelName,
 }
 

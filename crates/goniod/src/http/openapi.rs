@@ -15,7 +15,7 @@ use crate::{Action, Event};
 pub(crate) const API: &str = "/api/v1";
 
 /// Refusals that every operation may answer with.
-const REFUSALS: [(&str, &str); 7] = [
+const REFUSALS: [(&str, &str); 8] = [
     ("400", "Not understood"),
     ("401", "A token is needed"),
     (
@@ -24,6 +24,7 @@ const REFUSALS: [(&str, &str); 7] = [
     ),
     ("408", "It did not arrive in time"),
     ("413", "The body is too large"),
+    ("415", "Not a media type that is taken here"),
     ("422", "What was handed in is wrong"),
     ("429", "Too many requests"),
 ];

@@ -21,7 +21,6 @@ const DONE: StatusCode = StatusCode::NO_CONTENT;
 #[serde(deny_unknown_fields)]
 struct Jog {
     /// Which arm.
-    #[schema(inline)]
     arm: ArmName,
     /// Where to, degrees from the normal, positive towards +x.
     #[schema(minimum = -90, maximum = 90)]
