@@ -1,11 +1,79 @@
-//! The daemon is killed at random moments and loses nothing. `cargo run -p tests --bin kills` does it 200 times.
+//! The daemon is killed at random moments, or runs out of disk, and loses nothing.
+//! `cargo build -p tests && cargo run -p tests --bin kills -- 200` kills it 200 times.
 
+use std::os::unix::fs::PermissionsExt;
 use std::time::{SystemTime, UNIX_EPOCH};
+
+use tests::{Captured, Service, Simulator};
+
+const DAEMON: &str = env!("CARGO_BIN_EXE_e2e-daemon");
+const JOB: &str = "on_stage = true\n[[plane]]\ntheta_r_deg = 60\nreadings = 100\n[arc]\nreadings = 100\n";
 
 #[test]
 fn twenty_kills_lose_and_double_nothing() {
     let seed = SystemTime::now().duration_since(UNIX_EPOCH).unwrap().as_secs();
     println!("seed {seed}");
-    let tally = tests::kills(env!("CARGO_BIN_EXE_e2e-daemon"), seed, 20);
+    let tally = tests::kills(DAEMON, seed, 20);
     println!("{tally:?}");
+}
+
+#[test]
+fn a_full_disk_is_a_fault_and_the_run_goes_on_later() {
+    let folder = tempfile::tempdir().unwrap();
+    let simulator = Simulator::new("");
+    let (rig, data) = (simulator.rig_file(folder.path()), folder.path().join("data"));
+    let job = folder.path().join("job.toml");
+    std::fs::write(&job, JOB).unwrap();
+    // A file size limit stands for a full disk: the write fails, in a process that is told so and not killed for it.
+    let limited = folder.path().join("limited");
+    let script = format!("#!/bin/sh\ntrap '' XFSZ\nulimit -f 1500\nexec {DAEMON} \"$@\"\n");
+    std::fs::write(&limited, script).unwrap();
+    std::fs::set_permissions(&limited, std::fs::Permissions::from_mode(0o700)).unwrap();
+    let mut service = Service::start(limited.to_str().unwrap(), &rig, &data);
+    let id = service.ask(&format!("submit {}", job.display()))["id"].clone();
+    let mut told = Vec::new();
+    let fault = service.until(|said| {
+        if said["event"] == "reading" {
+            told.push(said["reading"]["step"].as_u64().unwrap());
+        }
+        (said["event"] == "fault").then(|| said["fault"].clone())
+    });
+    assert!(
+        ["disk_full", "store"].contains(&fault["code"].as_str().unwrap()),
+        "{fault}"
+    );
+    assert!(told.len() > 3, "{} readings before the disk was full", told.len());
+    service.kill();
+    let mut service = Service::start(DAEMON, &rig, &data);
+    service.until(|said| said.get("open").cloned());
+    // Refused where the disk was too full to keep the fault as well.
+    service.tell("acknowledge");
+    service.until(|said| said.get("answer").or(said.get("refusal")).cloned());
+    service.ask(&format!("resume {}", id.as_str().unwrap()));
+    service.until(|said| {
+        assert!(said["event"] != "fault", "{said}");
+        (said["event"] == "job" && said["job"]["state"] == "done").then_some(())
+    });
+    let run = std::fs::read_dir(data.join("runs"))
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap()
+        .path();
+    let captured = Captured::read(&run);
+    let mut steps: Vec<u64> = captured
+        .readings()
+        .filter(|reading| reading.accepted)
+        .map(|reading| reading.step as u64)
+        .collect();
+    assert!(
+        told.iter()
+            .all(|step| captured.readings().any(|reading| reading.step as u64 == *step))
+    );
+    steps.sort_unstable();
+    assert_eq!(
+        steps,
+        (0..steps.len() as u64).collect::<Vec<_>>(),
+        "each step once"
+    );
 }

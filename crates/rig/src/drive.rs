@@ -3,7 +3,7 @@ use std::time::Duration;
 use arms::Arm;
 use tokio::sync::watch;
 
-use crate::{Detector, Rig, RigFile, Snapshot};
+use crate::{Detector, Phase, Rig, RigFile, Snapshot};
 
 mod all;
 mod error;
@@ -93,33 +93,53 @@ impl<R: Rig> Drive<R> {
         self.seen.subscribe()
     }
 
-    /// Waits until both arms stand still, as those do not that a program set off which was killed.
+    /// Waits until both arms stand still and no integration runs: a program that was killed may have left either
+    /// behind.
     ///
     /// # Errors
-    /// A silent device; an arm that still moves after the time in which it could have crossed all its range.
+    /// A silent device; an arm that still moves after the time in which it could have crossed all its range. A
+    /// photometer that never ends is left to its next trigger, which it refuses.
     pub async fn rest(&mut self) -> Result<(), DriveError<R::Error>> {
         let begun = self.waited;
         loop {
             let snapshot = self.snapshot().await?;
+            let after = self.waited - begun;
             let moving = Arm::BOTH
                 .into_iter()
                 .find(|&arm| snapshot.arms[arm as usize].moving);
-            let Some(arm) = moving else { return Ok(()) };
-            let limits = self.file.envelope.limits(arm);
-            let longest = self.file.arm(arm).profile.duration_s(limits.max - limits.min);
-            let after = self.waited - begun;
-            if after > Duration::from_secs_f64(longest) + self.file.motion.timeout {
-                let location = snapshot.arms[arm as usize];
-                return Err(DriveError::NotArrived {
-                    arm,
-                    goal: location.goal,
-                    measured: location.measured,
-                    tolerance_rad: self.file.motion.tolerance_rad,
-                    after,
-                });
+            if let Some(arm) = moving {
+                self.check_resting(arm, &snapshot, after)?;
+            } else {
+                let longest = Duration::from_micros(self.file.photometer.integration_max_us.into());
+                let integrating = snapshot.detector.phase == Phase::Integrating;
+                if !integrating || after > longest + self.file.motion.timeout {
+                    return Ok(());
+                }
             }
             self.wait(REST).await?;
         }
+    }
+
+    /// Whether an arm may still be on the way that somebody set it off on so long ago.
+    fn check_resting(
+        &self,
+        arm: Arm,
+        snapshot: &Snapshot,
+        after: Duration,
+    ) -> Result<(), DriveError<R::Error>> {
+        let limits = self.file.envelope.limits(arm);
+        let longest = self.file.arm(arm).profile.duration_s(limits.max - limits.min);
+        if after <= Duration::from_secs_f64(longest) + self.file.motion.timeout {
+            return Ok(());
+        }
+        let location = snapshot.arms[arm as usize];
+        Err(DriveError::NotArrived {
+            arm,
+            goal: location.goal,
+            measured: location.measured,
+            tolerance_rad: self.file.motion.tolerance_rad,
+            after,
+        })
     }
 
     /// Lets time pass. While arms are engaged or the lamp is on, it looks at the rig every now and then, which also

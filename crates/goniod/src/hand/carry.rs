@@ -125,7 +125,7 @@ impl Hand {
         let Some(view) = self.shared.store.run(run).await? else {
             return Ok(());
         };
-        let directory = RunDirectory::at(view.directory);
+        let directory = RunDirectory::at(&view.directory);
         let mut writing = tokio::task::spawn_blocking(move || crate::daemon::write(&directory, &records));
         let written = loop {
             tokio::select! {
@@ -133,7 +133,11 @@ impl Hand {
                 () = pressed(&mut self.command) => self.halt().await,
             }
         };
-        written.expect("reports do not panic")?;
+        // A report that panics costs no measurement and not the thread of the rig.
+        written.map_err(|panic| report::ReportError::Write {
+            path: view.directory,
+            source: std::io::Error::other(panic),
+        })??;
         self.shared.store.reported(run, &self.shared.now()).await?;
         Ok(())
     }
