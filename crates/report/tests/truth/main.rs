@@ -2,4 +2,7 @@
 
 mod absolute;
 mod bench;
+#[path = "../../examples/campaign/campaign.rs"]
+mod campaign;
 mod coverage;
+mod faults;
