@@ -84,24 +84,22 @@ struct Source {
 
 impl Source {
     async fn next(&mut self) -> Option<sse::Event> {
-        loop {
-            let picture = async {
-                sleep_until(self.next_picture).await;
-                self.rig.changed().await
-            };
-            tokio::select! {
-                biased;
-                _ = self.closing.wait_for(|&closing| closing) => return None,
-                event = self.events.next() => {
-                    let event = event?;
-                    return encode(sse::Event::default().id(event.id.to_string()), &event);
-                }
-                changed = picture => {
-                    changed.ok()?;
-                    self.next_picture = Instant::now() + PICTURE_EVERY;
-                    let view = self.rig.borrow_and_update().clone();
-                    return encode(sse::Event::default().event("rig"), &view);
-                }
+        let picture = async {
+            sleep_until(self.next_picture).await;
+            self.rig.changed().await
+        };
+        tokio::select! {
+            biased;
+            _ = self.closing.wait_for(|&closing| closing) => None,
+            event = self.events.next() => {
+                let event = event?;
+                encode(sse::Event::default().id(event.id.to_string()), &event)
+            }
+            changed = picture => {
+                changed.ok()?;
+                self.next_picture = Instant::now() + PICTURE_EVERY;
+                let view = self.rig.borrow_and_update().clone();
+                encode(sse::Event::default().event("rig"), &view)
             }
         }
     }
