@@ -6,7 +6,7 @@ use std::time::Duration;
 use brdf::{Brdf, Fitted, MerlTable, Spherical};
 use criterion::{BenchmarkGroup, Criterion, measurement::WallTime};
 use glam::DVec3;
-use pdv::{Distribution, Observation, Planes, Separable, spread};
+use pdv::{Distribution, Observation, Planes, Sampler, Separable, spread};
 
 fn model() -> Separable {
     let theta_r = 70.0_f64.to_radians();
@@ -99,6 +99,14 @@ fn main() {
             black_box(planes.eval(*incident, *exitant));
         }
     });
+    let sampler = Sampler::new(&planes);
+    let sampling = seconds(&mut group, "importance sample of planes, 1024 times", || {
+        for (incident, exitant) in &pairs {
+            // Two even numbers of what is at hand.
+            let numbers = [0.5 + 0.5 * incident.x, 0.5 + 0.5 * incident.y].map(|n| n * 0.999);
+            black_box(sampler.sample(black_box(*exitant), black_box(numbers)));
+        }
+    });
     let merl = MerlTable::fill(&planes);
     let lookup = seconds(&mut group, "trilinear MERL lookup, 1024 pairs", || {
         for pair in &pairs {
@@ -127,7 +135,8 @@ fn main() {
     for (what, seconds) in [
         ("three exp_m1", exponentials),
         ("separable", evaluation),
-        ("planes", reciprocal),
+        ("planes (at most 60)", reciprocal),
+        ("importance sample (at most 150)", sampling),
         ("MERL lookup", lookup),
     ] {
         println!("{what}: {:.1} ns", seconds / 1024.0 * 1e9);

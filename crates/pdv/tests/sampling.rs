@@ -27,8 +27,8 @@ fn models(name: &str) -> [Box<dyn Model>; 2] {
         .collect();
     let planes = [20.0, 45.0, 70.0].map(|deg| plane(&material, deg));
     [
-        Box::new(Separable::from_observations(&planes[2], &arc).unwrap()),
-        Box::new(Planes::from_observations(&planes, &arc).unwrap()),
+        Box::new(Separable::from_observations(&planes[2], &arc).expect("there are readings")),
+        Box::new(Planes::from_observations(&planes, &arc).expect("there are readings")),
     ]
 }
 
@@ -88,7 +88,7 @@ fn what_is_drawn_has_the_density_that_is_told() {
                 (whole - 1.0).abs() < 2e-3,
                 "the density integrates to {whole} at {theta}"
             );
-            let (mut chi, mut freedom) = (0.0, -1.0);
+            let (mut chi, mut freedom) = (0.0_f64, -1.0_f64);
             for (count, share) in counts.iter().zip(&expected) {
                 let mean = share * f64::from(drawn);
                 if mean > 5.0 {
@@ -97,8 +97,8 @@ fn what_is_drawn_has_the_density_that_is_told() {
                 }
             }
             // 99.9 % of draws stay below by Wilson and Hilferty.
-            let limit = freedom
-                * (1.0 - 2.0 / (9.0 * freedom) + 3.09 * (2.0 / (9.0 * freedom) as f64).sqrt()).powi(3);
+            let limit =
+                freedom * (1.0 - 2.0 / (9.0 * freedom) + 3.09 * (2.0 / (9.0 * freedom)).sqrt()).powi(3);
             assert!(
                 chi < limit,
                 "chi² {chi} of {freedom}, at most {limit}, at {theta} with seed {SEED}"
