@@ -43,6 +43,55 @@ pub(crate) fn crossing(plane: &[Observation], arc: &[Observation], theta_r: f64,
     }
 }
 
+/// Two planes share poses in which light and sensor have changed places (Helmholtz): the sensor of either stands where
+/// the light of the other does, on the same side of the normal and on the other.
+pub(crate) fn helmholtz(first: (&[Observation], f64), second: (&[Observation], f64)) -> Check {
+    let name = "light and sensor swapped";
+    let [a, b] = [first.1, second.1];
+    let at = |(plane, theta_r): (&[Observation], f64), light: f64| {
+        let readings = plane.iter().map(|o| (o.deviation, o.rgb)).collect();
+        between(readings, light.sin() + theta_r.sin())
+    };
+    let pairs: Vec<(f64, DVec3, DVec3)> = [1.0, -1.0]
+        .into_iter()
+        .filter_map(|side| Some((side, at(first, side * b)?, at(second, side * a)?)))
+        .collect();
+    let degrees = [a, b].map(f64::to_degrees);
+    let which = format!("The planes at {:.0}° and {:.0}°", degrees[0], degrees[1]);
+    let worst = pairs
+        .iter()
+        .map(|(_, f, g)| {
+            (2.0 * (*f - *g) / (*f + *g).max(DVec3::splat(f64::MIN_POSITIVE)))
+                .abs()
+                .max_element()
+        })
+        .reduce(f64::max);
+    let values = json!({
+        "theta_r_deg": degrees,
+        "difference": worst,
+        "pairs": pairs.iter().map(|(_, f, g)| [f.to_array(), g.to_array()]).collect::<Vec<_>>(),
+    });
+    let Some(worst) = worst else {
+        return Check {
+            name,
+            verdict: Verdict::Unknown,
+            text: format!("{which} share no pose with light and sensor swapped within what was measured."),
+            values,
+        };
+    };
+    Check {
+        name,
+        verdict: limit(worst, SIDES_LIMIT),
+        text: format!(
+            "{which} share {} poses with light and sensor swapped, interpolated between readings; they differ by {:.1} % at most (up to {:.0} % is good).",
+            pairs.len(),
+            100.0 * worst,
+            100.0 * SIDES_LIMIT
+        ),
+        values,
+    }
+}
+
 /// The two sides of a plane at the same d_p: what the model takes to be equal.
 pub(crate) fn sides(plane: &[Observation], theta_r: f64) -> Check {
     let name = "both sides of the mirror direction";
@@ -205,6 +254,29 @@ mod tests {
             }
         }
         assert_eq!(energy(&Bright, 1).verdict, Verdict::Look);
+    }
+
+    #[test]
+    fn light_and_sensor_may_be_swapped_in_a_reciprocal_specimen_only() {
+        let plane = |theta_r: f64, factor: f64| -> Vec<Observation> {
+            let material = brdf::Fitted::named("blue-rubber").unwrap();
+            let at = |n: i32| Observation::of(&material, theta_r, f64::from(n) * 0.01);
+            let read = (-99..199).filter_map(at);
+            read.map(|o| Observation {
+                rgb: o.rgb * factor,
+                ..o
+            })
+            .collect()
+        };
+        let (first, good, bad) = (plane(0.3, 1.0), plane(0.8, 1.0), plane(0.8, 1.3));
+        let check = helmholtz((&first, 0.3), (&good, 0.8));
+        assert_eq!(check.verdict, Verdict::Good, "{}", check.text);
+        assert_eq!(check.values["pairs"].as_array().unwrap().len(), 2);
+        assert_eq!(helmholtz((&first, 0.3), (&bad, 0.8)).verdict, Verdict::Look);
+        assert_eq!(
+            helmholtz((&first, 0.3), (&bad[..1], 0.8)).verdict,
+            Verdict::Unknown
+        );
     }
 
     #[test]

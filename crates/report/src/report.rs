@@ -150,6 +150,15 @@ fn check(run: &Run, job: &Job, sweeps: &Sweeps, model: Option<&dyn Model>) -> Ve
         }
         checks.push(checks::sides(observations, plane.theta_r));
     }
+    let planes: Vec<_> = job
+        .planes
+        .iter()
+        .zip(&sweeps.planes)
+        .map(|(plane, observations)| (observations.as_slice(), plane.theta_r))
+        .collect();
+    for pair in planes.windows(2) {
+        checks.push(checks::helmholtz(pair[0], pair[1]));
+    }
     if let Some(model) = model {
         checks.push(checks::coverage(model));
         checks.push(checks::energy(
