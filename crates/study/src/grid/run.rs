@@ -67,12 +67,15 @@ pub(crate) fn run(grid: &Grid, directory: &Path, progress: &Progress<'_>) -> Res
         Ok(())
     })?;
     let mut ledger = ledger.into_inner().expect("nobody panics with it");
-    if !known.iter().any(|key| key.1 == Source::Baseline) {
+    let baselines = grid.materials.len() * (1 + grid.pca.len());
+    if known.iter().filter(|key| key.1 == Source::Baseline).count() < baselines {
         ledger.append(&baseline::rows(grid, &judge))?;
     }
     let mut rows = ledger.rows().to_vec();
     // Cores finish in any order; the same study is the same file.
     rows.sort_by_cached_key(GridRow::key);
+    // Of what was interrupted half-way, some rows were made again.
+    rows.dedup_by(|a, b| a.key() == b.key());
     document::write(grid, &rows, directory)
 }
 
@@ -92,12 +95,16 @@ fn tasks<'a>(
         );
         known.contains(&key)
     };
+    let mut sets: Vec<&GridPlan> = grid.plans.iter().collect();
+    sets.dedup_by(|a, b| a.planes_deg == b.planes_deg);
+    let suited = |plan: &&GridPlan| grid.models.iter().filter(|&&model| plan.suits(model)).count();
+    let of_floor: usize = sets.iter().map(suited).sum();
     let mut tasks = Vec::new();
     for material in &grid.materials {
-        if !known
+        let floors = known
             .iter()
-            .any(|key| key.0 == material.name && key.1 == Source::Floor)
-        {
+            .filter(|key| key.0 == material.name && key.1 == Source::Floor);
+        if floors.count() < of_floor {
             tasks.push(Task::Floor(material));
         }
         for plan in &grid.plans {
