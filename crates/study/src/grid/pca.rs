@@ -131,24 +131,30 @@ impl<'a> Pca<'a> {
         });
         let normal = at.tr_mul(&at) + DMatrix::<f64>::identity(k, k) * (ETA * chosen.len() as f64);
         let solver = normal.cholesky();
-        let mut estimate = vec![DVec3::ZERO; self.judge.pairs().len()];
-        for channel in 0..3 {
+        let pairs = self.judge.pairs();
+        let channel = |channel: usize| -> Vec<f64> {
             let readings = DVector::from_fn(chosen.len(), |row, _| {
                 let place = chosen[row];
                 let (incident, exitant) = self.places.pairs()[place];
                 let f = self.values[material][0][place][channel];
                 mapped(f, basis.middle[0][place], weight(incident, exitant)) - basis.mean[0][place]
             });
-            let Some(solver) = &solver else { continue };
+            let Some(solver) = &solver else {
+                return vec![0.0; pairs.len()];
+            };
             let coefficients = solver.solve(&at.tr_mul(&readings));
             let columns = basis.scaled[1].columns(0, k) * coefficients + &basis.mean[1];
-            for (row, &(incident, exitant)) in self.judge.pairs().iter().enumerate() {
+            let back = |(row, &(incident, exitant)): (usize, &(DVec3, DVec3))| {
                 let w = weight(incident, exitant);
                 let f = (columns[row].exp() * (basis.middle[1][row] * w + EPSILON) - EPSILON) / w;
-                estimate[row][channel] = f.max(0.0);
-            }
-        }
-        estimate
+                f.max(0.0)
+            };
+            pairs.iter().enumerate().map(back).collect()
+        };
+        let [r, g, b] = [0, 1, 2].map(channel);
+        (0..pairs.len())
+            .map(|row| DVec3::new(r[row], g[row], b[row]))
+            .collect()
     }
 }
 

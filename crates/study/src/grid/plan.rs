@@ -1,5 +1,3 @@
-use std::fmt::Write;
-
 use sweep::{Job, Model};
 
 use crate::Error;
@@ -35,15 +33,9 @@ impl GridPlan {
     /// # Errors
     /// What a job file may not ask for.
     pub fn job(&self) -> Result<Job, Error> {
-        let mut text = String::new();
-        for theta_r in &self.planes_deg {
-            let plane = writeln!(
-                text,
-                "[[plane]]\ntheta_r_deg = {theta_r:?}\nreadings = {}",
-                self.readings
-            );
-            plane.expect("writing to a String does not fail");
-        }
+        let readings = self.readings;
+        let plane = |theta_r: &f64| format!("[[plane]]\ntheta_r_deg = {theta_r:?}\nreadings = {readings}\n");
+        let mut text: String = self.planes_deg.iter().map(plane).collect();
         if self.arc > 0 {
             text += &format!("[arc]\nreadings = {}\n", self.arc);
         }
