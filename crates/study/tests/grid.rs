@@ -17,7 +17,7 @@ compare = { pairs = 500, theta_max_deg = 80.0, seed = 3 }
 
 /// Rows without the seconds that this machine took.
 fn rows(directory: &Path) -> Vec<Vec<String>> {
-    let text = fs::read_to_string(directory.join("study.csv")).unwrap();
+    let text = fs::read_to_string(directory.join("study.csv")).expect("the study wrote it");
     let cells = |line: &str| -> Vec<String> {
         let cells = line.split(',').map(str::to_owned).enumerate();
         cells.filter(|(i, _)| *i != 9).map(|(_, cell)| cell).collect()
