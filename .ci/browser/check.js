@@ -29,7 +29,7 @@ const complaints = [];
 async function open(options) {
   const context = await browser.newContext({ reducedMotion: "no-preference", ...options });
   const page = await context.newPage();
-  page.setDefaultTimeout(30_000);
+  page.setDefaultTimeout(LONG);
   page.on("console", (message) => { if (["error", "warning"].includes(message.type())) complaints.push(`console: ${message.text()} (${message.location().url})`); });
   page.on("pageerror", (error) => complaints.push(`page: ${error.stack}`));
   page.on("request", (request) => { if (!request.url().startsWith(address) && !request.url().startsWith("data:")) complaints.push(`fetched ${request.url()}`); });
@@ -130,6 +130,8 @@ try {
   await look("running");
 
   console.log("opens the report");
+  // A run that was interrupted has a report too, of what was measured until then.
+  await until("the end", async () => (await main.locator("#run-list .chip").textContent()) === "done");
   await until("the report", async () => (await main.locator("#run-list a").count()) === 1);
   await look("done");
   await main.locator("#run-list a").click();
