@@ -1,11 +1,15 @@
 //! Parts of a certificate from readings of a standard on the stage.
 
 use arms::Pose;
+use glam::{DMat3, DVec3};
 
 use super::certificate::{Certificate, Colour, Conditions, Patch, Trap, White, Zero};
 use super::reduction::Reduction;
 use super::{Filling, Taken};
 use crate::{Gain, RigError, RigFile};
+
+/// Patches span the colours where the determinant of their normal matrix is above this share of its trace, cubed.
+const SINGULAR: f64 = 1e-9;
 
 /// One geometry of a white reference's certificate.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -242,55 +246,40 @@ impl Colour {
     /// # Errors
     /// Fewer than three patches, or patches that differ too little in colour.
     pub fn measure(patches: &[Patch]) -> Result<Self, RigError> {
-        let product = |a: usize, of: &dyn Fn(&Patch) -> f64| -> f64 {
-            patches.iter().map(|patch| patch.sensor[a] * of(patch)).sum()
-        };
-        let normal: [[f64; 3]; 3] =
-            std::array::from_fn(|a| std::array::from_fn(|b| product(a, &|patch| patch.sensor[b])));
-        let inverse = inverse(&normal).ok_or_else(|| RigError::Calibration {
-            what: "colour patches",
-            why: format!(
-                "{} patches do not span the colours; at least three that differ are needed",
-                patches.len()
-            ),
-        })?;
-        let matrix: [[f64; 3]; 3] = std::array::from_fn(|row| {
-            let right: [f64; 3] = std::array::from_fn(|a| product(a, &|patch| patch.rgb[row]));
-            std::array::from_fn(|a| (0..3).map(|b| inverse[a][b] * right[b]).sum())
-        });
-        let squares: f64 = patches
-            .iter()
-            .flat_map(|patch| {
-                (0..3).map(move |row| {
-                    let said: f64 = (0..3).map(|a| matrix[row][a] * patch.sensor[a]).sum();
-                    (said - patch.rgb[row]).powi(2)
-                })
-            })
-            .sum();
+        let mut normal = DMat3::ZERO;
+        let mut right = DMat3::ZERO;
+        for patch in patches {
+            let (sensor, rgb) = (DVec3::from(patch.sensor), DVec3::from(patch.rgb));
+            normal += outer(sensor, sensor);
+            right += outer(rgb, sensor);
+        }
+        let size = normal.diagonal().element_sum().powi(3);
+        let spans = normal.determinant() > SINGULAR * size;
+        if !spans {
+            return Err(RigError::Calibration {
+                what: "colour patches",
+                why: format!(
+                    "{} patches do not span the colours; at least three that differ are needed",
+                    patches.len()
+                ),
+            });
+        }
+        let matrix = right * normal.inverse();
+        let left =
+            |patch: &Patch| (matrix * DVec3::from(patch.sensor) - DVec3::from(patch.rgb)).length_squared();
+        let squares: f64 = patches.iter().map(left).sum();
         let white = patches.iter().flat_map(|patch| patch.rgb).fold(0.0, f64::max);
         Ok(Self {
             conditions: Conditions::default(),
-            matrix,
+            matrix: matrix.transpose().to_cols_array_2d(),
             residual: (squares / (3 * patches.len()) as f64).sqrt() / white,
         })
     }
 }
 
-/// Inverse of a symmetric matrix by cofactors; `None` where it is singular to nine digits.
-fn inverse(m: &[[f64; 3]; 3]) -> Option<[[f64; 3]; 3]> {
-    let cofactor = |row: usize, column: usize| {
-        let [r0, r1] = [(row + 1) % 3, (row + 2) % 3];
-        let [c0, c1] = [(column + 1) % 3, (column + 2) % 3];
-        m[r0][c0] * m[r1][c1] - m[r0][c1] * m[r1][c0]
-    };
-    let determinant: f64 = (0..3).map(|column| m[0][column] * cofactor(0, column)).sum();
-    let scale = (m[0][0] + m[1][1] + m[2][2]).powi(3);
-    if !(determinant.abs() > 1e-9 * scale) {
-        return None;
-    }
-    Some(std::array::from_fn(|a| {
-        std::array::from_fn(|b| cofactor(b, a) / determinant)
-    }))
+/// a bᵀ.
+fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
 /// Mean and the standard uncertainty of it; of a single value that is 0.
