@@ -24,7 +24,7 @@ pub struct Header {
     /// The stored calibration that holds for the run, where one is used: kept whole, so that the run can be worked out
     /// again without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub certificate: Option<Certificate>,
+    pub certificate: Option<Box<Certificate>>,
 }
 
 /// How an execution of a plan ended.

@@ -76,7 +76,7 @@ impl Order {
             rig: self.rig_text.clone(),
             plan,
             started: humantime::format_rfc3339_seconds(now).to_string(),
-            certificate: self.certificate(now)?,
+            certificate: self.certificate(now)?.map(Box::new),
         })
     }
 

@@ -109,7 +109,7 @@ pub(crate) fn all_taken(records: &[Record]) -> Vec<(&Reading, Taken)> {
 /// The stored calibration that holds for a run, from its journal.
 pub(crate) fn certificate(records: &[Record]) -> Option<&Certificate> {
     match records.first() {
-        Some(Record::Header(header)) => header.certificate.as_ref(),
+        Some(Record::Header(header)) => header.certificate.as_deref(),
         _ => None,
     }
 }

@@ -209,7 +209,7 @@ impl Run {
             version: header.version.clone(),
             job: Given::new(&header.job),
             rig: Given::new(&header.rig),
-            calibration: header.certificate.as_ref().map(Used::new),
+            calibration: header.certificate.as_deref().map(Used::new),
             identities: Vec::new(),
             started: header.started.clone(),
             ended: None,

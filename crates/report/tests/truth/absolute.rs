@@ -52,11 +52,11 @@ const EVERYTHING: &str = "imperfections = \"default\"\nresponsivity_error = 0.07
 
 /// The largest relative error of the model of a Lambertian specimen over directions of 0 … 75°, in and out of plane.
 fn worst(records: &[Record], file: &RigFile) -> f64 {
-    let job = Job::parse(JOB, "job.toml").unwrap();
+    let job = Job::parse(JOB, "job.toml").expect("the job above is sound");
     let all = measurements(records, file);
     let plane = report::observations(&all, Sweep::Plane(0));
     let arc = report::observations(&all, Sweep::Arc);
-    let model = model(job.model, &[plane], &arc).unwrap();
+    let model = model(job.model, &[plane], &arc).expect("a captured plane and arc make a model");
     let truth = ALBEDO / PI;
     let at = |deg: f64, azimuth: f64| {
         let (sin, cos) = deg.to_radians().sin_cos();

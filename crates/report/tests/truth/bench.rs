@@ -88,7 +88,7 @@ impl Laboratory {
             rig: self.text.clone(),
             plan,
             started: String::new(),
-            certificate: Some(self.certificate.clone()),
+            certificate: Some(Box::new(self.certificate.clone())),
         })]);
         let (_operator, control) = watch::channel(Command::Run);
         let mut drive = Drive::new(rig, self.file.clone());
