@@ -248,7 +248,7 @@ pub(crate) enum OnStage {
     Trap,
     /// A white reference: responsivity, gains, linearity.
     White {
-        /// Its certificate: name, u_percent and [[at]] with light_deg, sensor_deg, reflectance_factor; 98 % ± 0.5 % at
+        /// Its certificate: name, u_percent and tables `at` with light_deg, sensor_deg, reflectance_factor; 98 % ± 0.5 % at
         /// 45°/0° unless given.
         #[arg(long, value_name = "FILE.toml")]
         standard: Option<PathBuf>,

@@ -1,8 +1,8 @@
 //! The capture daemon as a library: a queue of jobs that loses nothing, and the rig that works it off.
 //!
 //! [`Daemon`] is the service: it keeps jobs, runs and readings in a [`Store`], carries one job after the other
-//! through, and obeys an operator at once; [`http`] lets others use it. [`run`] carries out a single order without it. Front ends send commands
-//! and watch events; none of them drives.
+//! through, and obeys an operator at once; [`http`] lets others use it. [`run()`] carries out a single order without
+//! it. Front ends send commands and watch events; none of them drives.
 
 mod calibrate;
 mod certificates;

@@ -93,7 +93,7 @@ async fn acknowledge(State(shared): State<Shared>, Extension(by): Extension<Call
 }
 
 /// Move one arm by hand, within the envelope.
-#[utoipa::path(post, path = "/jog", tag = "rig", request_body = Jog, responses((status = 204, description = "Arrived"),
+#[utoipa::path(post, path = "/jog", tag = "rig", request_body = Jog, responses((status = 204, description = "Checked; the arm is on its way"),
     (status = 409, body = Problem, content_type = "application/problem+json", description = "The rig is busy, or holds a fault"),
     (status = 422, body = Problem, content_type = "application/problem+json", description = "Not within the envelope"),
     (status = 503, body = Problem, content_type = "application/problem+json", description = "The rig does not answer")))]
@@ -113,7 +113,7 @@ async fn jog(
 }
 
 /// Take both arms to rest.
-#[utoipa::path(post, path = "/park", tag = "rig", responses((status = 204, description = "At rest"),
+#[utoipa::path(post, path = "/park", tag = "rig", responses((status = 204, description = "Checked; the arms are on their way"),
     (status = 409, body = Problem, content_type = "application/problem+json", description = "The rig is busy, or holds a fault"),
     (status = 422, body = Problem, content_type = "application/problem+json", description = "No way there within the envelope"),
     (status = 503, body = Problem, content_type = "application/problem+json", description = "The rig does not answer")))]
