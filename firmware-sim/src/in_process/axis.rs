@@ -158,7 +158,12 @@ impl Actuator for InProcessAxis {
             0 => 0.0,
             _ => v * v.abs() / (2.0 * a) * rig::COUNTS_PER_TURN / std::f64::consts::TAU,
         };
-        // Braking must not lead out of the limits, nor back.
+        // Braking must not lead beyond where the arm was going, out of the limits, nor back.
+        let heading = self.read(servo::GOAL_POSITION)? as f64 - present;
+        let way = match heading * v > 0.0 {
+            true => way.abs().min(heading.abs()).copysign(v),
+            false => way,
+        };
         let [low, high] = self.range.map(f64::round);
         let goal = (present + way).clamp(low.min(present), high.max(present));
         self.write(servo::GOAL_POSITION, goal.round() as i64)

@@ -206,6 +206,7 @@ impl Script {
         })]);
         let mut drive = Drive::new(rig, file.clone());
         let (_operator, control) = watch::channel(Command::Run);
+        let mut last = String::new();
         for execution in 1..=MAX_EXECUTIONS {
             let mut unseen = |_| ();
             let run = capture::run(&mut drive, &mut journal, control.clone(), &mut unseen);
@@ -227,7 +228,8 @@ impl Script {
                 Outcome::Failed { fault } if fault.is_empty() => {
                     return Err("a fault without words".to_owned());
                 }
-                Outcome::Failed { .. } => {
+                Outcome::Failed { fault } => {
+                    last = fault;
                     for device in [Device::Light, Device::Sensor, Device::Photometer] {
                         bench.reboot(device);
                     }
@@ -235,7 +237,9 @@ impl Script {
                 }
             }
         }
-        Err(format!("not complete after {MAX_EXECUTIONS} executions"))
+        Err(format!(
+            "not complete after {MAX_EXECUTIONS} executions; last: {last}"
+        ))
     }
 }
 

@@ -84,6 +84,7 @@ impl Servo {
     async fn stopping_goal(&self) -> Result<i32, RigError> {
         let acceleration = self.node.ask_i32(servo::PROFILE_ACCELERATION).await?;
         let velocity = self.node.ask_i32(servo::PRESENT_VELOCITY).await?;
+        let heading = f64::from(self.node.ask_i32(servo::GOAL_POSITION).await?);
         let position = self.node.ask_i32(servo::PRESENT_POSITION).await?;
         let counts = |rad: f64| rad * COUNTS_PER_TURN / TAU;
         let v = counts(f64::from(velocity) * VELOCITY_UNIT_RAD_S);
@@ -94,6 +95,13 @@ impl Servo {
         // The arm has gone on since its position was read; a goal too near would make it swing back.
         let ahead = braking + v.abs() * self.latency.as_secs_f64();
         let goal = f64::from(position) + ahead.round().copysign(v);
+        // Nor may it lead beyond where the arm was going: the way was checked only up to there.
+        let onward = (heading - f64::from(position)) * v > 0.0;
+        let goal = match onward {
+            true if v > 0.0 => goal.min(heading),
+            true => goal.max(heading),
+            false => goal,
+        };
         // Braking must not lead out of the limits, nor back.
         let ends = [self.limits.min, self.limits.max].map(|end| self.settings.axis.counts(end).round());
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
