@@ -50,6 +50,9 @@ pub(super) async fn noise(drive: &mut Drive<Dynamixel>) -> Result<Vec<Finding>> 
     Ok(findings)
 }
 
+/// Times that the exposures are gone through: the lamp wobbles by some thousandths, and takes seconds for it.
+const LADDERS: u32 = 8;
+
 /// Whether the counts of every channel grow in proportion to the integration time; the lamp is on.
 pub(super) async fn linearity(drive: &mut Drive<Dynamixel>) -> Result<Finding> {
     const CHECK: &str = "linearity";
@@ -62,11 +65,22 @@ pub(super) async fn linearity(drive: &mut Drive<Dynamixel>) -> Result<Finding> {
     let full = FULL * f64::from(settings.full_scale);
     let longest_us =
         (f64::from(integration_us) * full / brightest).min(f64::from(settings.integration_max_us));
-    let mut taken: Vec<Counts> = Vec::new();
-    for halving in (0..DOUBLINGS).rev() {
-        let integration_us = (longest_us / f64::from(1 << halving)) as u32;
-        if integration_us >= settings.integration_min_us {
-            taken.push(drive.expose(Exposure { integration_us, gain }).await?);
+    let mut taken: Vec<Mean> = (0..DOUBLINGS)
+        .rev()
+        .map(|halving| (longest_us / f64::from(1 << halving)) as u32)
+        .filter(|&integration_us| integration_us >= settings.integration_min_us)
+        .map(|integration_us| Mean {
+            integration_us,
+            counts: [0.0; 4],
+        })
+        .collect();
+    for _ in 0..LADDERS {
+        for mean in &mut taken {
+            let integration_us = mean.integration_us;
+            let counts = channels(&drive.expose(Exposure { integration_us, gain }).await?);
+            for (sum, counts) in mean.counts.iter_mut().zip(counts) {
+                *sum += counts / f64::from(LADDERS);
+            }
         }
     }
     let [Some(first), Some(last)] = [taken.first(), taken.last()] else {
@@ -76,15 +90,15 @@ pub(super) async fn linearity(drive: &mut Drive<Dynamixel>) -> Result<Finding> {
             "correct [photometer]",
         ));
     };
-    let telling = |&channel: &usize| channels(last)[channel] >= f64::from(settings.enough);
+    let telling = |&channel: &usize| last.counts[channel] >= f64::from(settings.enough);
     let worst = (0..4)
         .filter(telling)
         .map(|channel| bend(&taken, channel))
         .fold(0.0, f64::max);
     let text = format!(
         "over {} … {} µs, at most {:.2} % off proportion",
-        first.exposure.integration_us,
-        last.exposure.integration_us,
+        first.integration_us,
+        last.integration_us,
         100.0 * worst
     );
     Ok(if worst <= BENT {
@@ -104,6 +118,12 @@ pub(super) async fn linearity(drive: &mut Drive<Dynamixel>) -> Result<Finding> {
     })
 }
 
+/// What exposures of one length gave on average: red, green, blue, monitor.
+struct Mean {
+    integration_us: u32,
+    counts: [f64; 4],
+}
+
 /// Red, green, blue, monitor.
 fn channels(counts: &Counts) -> [f64; 4] {
     let [r, g, b] = counts.rgb.map(f64::from);
@@ -112,10 +132,10 @@ fn channels(counts: &Counts) -> [f64; 4] {
 
 /// Largest relative deviation of one channel's slope between two exposures from that over all of them. Slopes, so that
 /// what is there without light and time does not matter.
-fn bend(taken: &[Counts], channel: usize) -> f64 {
-    let slope = |a: &Counts, b: &Counts| {
-        let time = f64::from(b.exposure.integration_us) - f64::from(a.exposure.integration_us);
-        (channels(b)[channel] - channels(a)[channel]) / time
+fn bend(taken: &[Mean], channel: usize) -> f64 {
+    let slope = |a: &Mean, b: &Mean| {
+        let time = f64::from(b.integration_us) - f64::from(a.integration_us);
+        (b.counts[channel] - a.counts[channel]) / time
     };
     let (Some(first), Some(last)) = (taken.first(), taken.last()) else {
         return 0.0;
