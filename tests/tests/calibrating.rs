@@ -42,7 +42,7 @@ fn a_rig_is_calibrated_from_the_command_line() {
     let text = String::from_utf8_lossy(&done.stderr);
     assert_eq!(done.status.code(), Some(0), "{text}");
     let summary: serde_json::Value = serde_json::from_slice(&done.stdout).unwrap();
-    let median = summary["errors"]["overall"]["median_rel"].as_f64().unwrap();
+    let median = summary["errors"]["median_rel"].as_f64().unwrap();
     assert!(median < 0.005, "{median}");
     let directory = here.join(summary["directory"].as_str().unwrap());
     let named: serde_json::Value =
