@@ -1,6 +1,6 @@
 //! Whether a bus behaves as this program expects of it: ours, a stranger's simulator, or the real thing.
 //!
-//! Unlike [`doctor`](crate::doctor) this moves the arms, within the envelope, lets the servos' watchdogs trip and
+//! Unlike [`doctor`] this moves the arms, within the envelope, lets the servos' watchdogs trip and
 //! switches the lamp. The arms must be clear, and somebody must stand by.
 
 mod motion;
