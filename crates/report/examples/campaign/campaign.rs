@@ -310,7 +310,7 @@ fn whole(records: &[Record], steps: usize, file: &RigFile) -> Result<u64, String
 }
 
 /// Records in memory.
-struct Memory(Vec<Record>);
+pub(crate) struct Memory(pub(crate) Vec<Record>);
 
 #[async_trait::async_trait]
 impl Journal for Memory {

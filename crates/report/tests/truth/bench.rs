@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use brdf::Brdf;
-use capture::{Command, Header, Journal, JournalError, Outcome, Record};
+use capture::{Command, Header, Outcome, Record};
 use firmware_sim::Bench;
 use firmware_sim::in_process::InProcessRig;
 use report::Standard;
@@ -11,20 +11,7 @@ use rig::{Certificate, Drive, Rig, RigFile};
 use sweep::{Job, Plan};
 use tokio::sync::watch;
 
-/// Records in memory.
-struct Memory(Vec<Record>);
-
-#[async_trait::async_trait]
-impl Journal for Memory {
-    async fn append(&mut self, record: &Record) -> Result<(), JournalError> {
-        self.0.push(record.clone());
-        Ok(())
-    }
-
-    fn records(&self) -> &[Record] {
-        &self.0
-    }
-}
+use crate::campaign::Memory;
 
 /// A rig with what was found out about it.
 pub(crate) struct Laboratory {
