@@ -59,8 +59,12 @@ impl Trajectory {
         let peak = (a * d1 + v1 * v1 / 2.0).max(0.0).sqrt().min(v_max).max(v1);
         let up = (peak - v1) / a;
         let down = peak / a;
-        let cruise =
-            ((d1 - (v1 + peak) / 2.0 * up - peak / 2.0 * down) / peak.max(f64::MIN_POSITIVE)).max(0.0);
+        // Below the cruising speed there is none; what rounding leaves of the way would be divided by a tiny peak.
+        let cruise = if peak < v_max {
+            0.0
+        } else {
+            ((d1 - (v1 + peak) / 2.0 * up - peak / 2.0 * down) / peak).max(0.0)
+        };
         let mut phases = [(0.0, 0.0, 0.0, 0.0); 4];
         let (mut p, mut v) = (position, v0 * direction);
         for (phase, (acceleration, t)) in
