@@ -5,4 +5,5 @@ mod extensions;
 mod faults;
 mod journal;
 mod operator;
+mod time;
 mod whole;

@@ -1,0 +1,79 @@
+//! How long a capture takes beside what the mechanics and the light demand.
+
+use capture::{Outcome, Reading};
+use rig::dynamixel::register::servo;
+use sweep::Sweep;
+
+use crate::bench::{QUICKSTART, SERVOS, Scene, peek};
+
+/// Units of the profile registers in degrees/s and degrees/s²: 0.229 rev/min and 214.577 rev/min² (e-manual, "Profile
+/// Velocity(112)", "Profile Acceleration(108)").
+const VELOCITY_UNIT_DEG_S: f64 = 0.229 * 360.0 / 60.0;
+const ACCELERATION_UNIT_DEG_S2: f64 = 214.577 * 360.0 / 3600.0;
+
+/// Seconds below which no capture with these readings can be: the slower arm's trapezoid between each two poses, the
+/// settling after it, the light of the readings that count, and the warm-up of the lamp. Nothing of the planner's or the
+/// drive's is used.
+fn floor_s(scene: &Scene, from_deg: [f64; 2]) -> f64 {
+    let profiles = SERVOS.map(|device| {
+        let velocity = peek(&scene.bench, device, servo::PROFILE_VELOCITY) as f64;
+        let acceleration = peek(&scene.bench, device, servo::PROFILE_ACCELERATION) as f64;
+        (
+            velocity * VELOCITY_UNIT_DEG_S,
+            acceleration * ACCELERATION_UNIT_DEG_S2,
+        )
+    });
+    let leg_s = |way_deg: f64, (v, a): (f64, f64)| {
+        let ramps_deg = v * v / a;
+        if way_deg < ramps_deg {
+            2.0 * (way_deg / a).sqrt()
+        } else {
+            way_deg / v + v / a
+        }
+    };
+    let file = scene.drive.file();
+    let settle_s = file.motion.settle.as_secs_f64();
+    let mut at_deg = from_deg;
+    let mut floor_s = file.photometer.lamp_warm_up.as_secs_f64();
+    for reading in scene.journal.accepted() {
+        let to_deg = [reading.goal.light.deg(), reading.goal.sensor.deg()];
+        let legs = [0, 1].map(|arm| leg_s((to_deg[arm] - at_deg[arm]).abs(), profiles[arm]));
+        let motion_s = legs[0].max(legs[1]);
+        if motion_s > 0.0 {
+            floor_s += motion_s + settle_s;
+        }
+        floor_s += f64::from(reading.counts.exposure.integration_us) * 1e-6;
+        at_deg = to_deg;
+    }
+    floor_s
+}
+
+fn of(readings: &[&Reading], sweep: Sweep) -> usize {
+    readings.iter().filter(|reading| reading.sweep == sweep).count()
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_full_capture_takes_hardly_longer_than_its_motion_settling_and_light() {
+    for specimen in ["gold-paint", "chrome", "alum-bronze"] {
+        let mut scene = Scene::new(QUICKSTART, &format!("specimen = \"{specimen}\"")).await;
+        let start = scene.bench.pose();
+        let before = scene.bench.now();
+        assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+        let taken_s = (scene.bench.now() - before).as_secs_f64();
+        let floor_s = floor_s(&scene, [start.light.deg(), start.sensor.deg()]);
+        println!(
+            "{specimen}: floor {floor_s:.2} s, taken {taken_s:.2} s, {:.3} of it",
+            taken_s / floor_s
+        );
+        let readings = scene.journal.accepted();
+        assert!(of(&readings, Sweep::Plane(0)) > 80 && of(&readings, Sweep::Arc) > 80);
+        assert!(
+            taken_s > 0.999 * floor_s,
+            "{specimen}: faster than its floor of {floor_s} s"
+        );
+        assert!(
+            taken_s < 1.15 * floor_s,
+            "{specimen}: floor {floor_s} s, taken {taken_s} s"
+        );
+    }
+}
