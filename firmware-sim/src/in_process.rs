@@ -15,7 +15,7 @@ use std::time::Duration;
 
 use arms::{Arm, Pose};
 use rig::dynamixel::register::{Register, servo};
-use rig::{Detector, Device, Rig, RigFile, Snapshot};
+use rig::{Detector, Device, Observation, Rig, RigFile, Snapshot};
 use tokio::time::Instant;
 
 pub use axis::InProcessAxis;
@@ -91,6 +91,14 @@ impl Rig for InProcessRig {
         Ok(Snapshot {
             arms: [self.axes[0].look()?, self.axes[1].look()?],
             detector: self.photometer.status().await?,
+        })
+    }
+
+    async fn observe(&mut self) -> Result<Observation, InProcessError> {
+        Ok(Observation {
+            snapshot: self.snapshot().await?,
+            ticks: self.photometer.ticks().await?,
+            counts: self.photometer.counts().await?,
         })
     }
 

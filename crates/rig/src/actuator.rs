@@ -52,6 +52,17 @@ pub trait Actuator: Send {
     /// No reply, refusal, hardware error.
     fn engage(&mut self, profile: Profile) -> impl Future<Output = Result<(), Self::Error>> + Send;
 
+    /// Goes to a goal, or on to it, on another profile; an arm that moves is braked or sped up without a stop. The
+    /// profile stays until the next one.
+    ///
+    /// # Errors
+    /// No reply, refusal, hardware error.
+    fn steer(
+        &mut self,
+        goal: ArmAngle,
+        profile: Profile,
+    ) -> impl Future<Output = Result<(), Self::Error>> + Send;
+
     /// Setpoint and readback.
     ///
     /// # Errors

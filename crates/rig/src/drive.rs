@@ -8,6 +8,7 @@ use crate::{Detector, Phase, Rig, RigFile, Snapshot};
 mod all;
 mod error;
 mod expose;
+mod fly;
 mod retry;
 mod travel;
 
@@ -72,6 +73,11 @@ impl<R: Rig> Drive<R> {
         let snapshot = self
             .retry("read the rig's state", |rig| Box::pin(rig.snapshot()))
             .await?;
+        self.note(snapshot)
+    }
+
+    /// Tells who watches, and looks whether engaged arms are sound.
+    fn note(&mut self, snapshot: Snapshot) -> Result<Snapshot, DriveError<R::Error>> {
         self.seen.send_replace(Some(snapshot));
         if self.engaged {
             for arm in Arm::BOTH {

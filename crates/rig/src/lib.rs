@@ -31,4 +31,4 @@ pub use file::{
     Approach, ArmSettings, BusSettings, Certificates, Estop, MotionSettings, PhotometerSettings, Port,
     RigFile, Uncertainties, Visits,
 };
-pub use rig::{Rig, Snapshot};
+pub use rig::{Observation, Rig, Snapshot};

@@ -3,7 +3,7 @@ use std::time::Duration;
 
 use arms::{Arm, Pose};
 
-use crate::{Actuator, Detector, DetectorStatus, Fault, Location};
+use crate::{Actuator, Counts, Detector, DetectorStatus, Fault, Location};
 
 /// The whole rig at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +22,17 @@ impl Snapshot {
             sensor: self.arms[1].measured,
         }
     }
+}
+
+/// The whole rig at one moment of the photometer's clock, with its latest reading.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Observation {
+    /// Arms and photometer.
+    pub snapshot: Snapshot,
+    /// The photometer's clock at that moment, in ticks of 10 µs, 24 bits, wraps.
+    pub ticks: u32,
+    /// The latest reading; `None` before the first trigger and while one is being taken.
+    pub counts: Option<Counts>,
 }
 
 /// Two arms and a photometer.
@@ -51,6 +62,13 @@ pub trait Rig: Send {
     /// # Errors
     /// No reply from one of them.
     fn snapshot(&mut self) -> impl Future<Output = Result<Snapshot, Self::Error>> + Send;
+
+    /// As [`Rig::snapshot`], with the photometer's clock and its latest reading, all in the same transaction: what a
+    /// capture in flight puts together by time.
+    ///
+    /// # Errors
+    /// No reply from one of them.
+    fn observe(&mut self) -> impl Future<Output = Result<Observation, Self::Error>> + Send;
 
     /// Lets time pass: sleeps on a real bus, tells a simulated one in wire time to advance its clock.
     ///

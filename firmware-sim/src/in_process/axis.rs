@@ -138,6 +138,13 @@ impl Actuator for InProcessAxis {
         self.write(common::BUS_WATCHDOG, super::watchdog_units(self.motion.watchdog))
     }
 
+    async fn steer(&mut self, goal: ArmAngle, profile: Profile) -> Result<(), InProcessError> {
+        let [velocity, acceleration] = self.arm.axis.profile_registers(profile);
+        self.write(servo::PROFILE_ACCELERATION, i64::from(acceleration))?;
+        self.write(servo::PROFILE_VELOCITY, i64::from(velocity))?;
+        self.write(servo::GOAL_POSITION, self.counts(goal))
+    }
+
     async fn location(&mut self) -> Result<Location, InProcessError> {
         self.look()
     }

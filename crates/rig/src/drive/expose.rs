@@ -21,25 +21,12 @@ impl<R: Rig> Drive<R> {
     /// A silent or failing photometer; a reading that is not the one triggered.
     pub async fn expose(&mut self, exposure: Exposure) -> Result<Counts, DriveError<R::Error>> {
         let before = self.sequence().await?;
-        let expected = (before + 1) % SEQUENCE_MODULUS;
+        let expected = self.trigger(before, exposure).await?;
         let wrong = |found: String| DriveError::Reading {
             expected,
             exposure,
             found,
         };
-        let mut patience = Patience::new(self.file.bus.silence);
-        while let Err(error) = self.rig.photometer().trigger(exposure).await {
-            let lost = error.kind() == FaultKind::NoReply;
-            patience.spend("trigger the photometer", error).await?;
-            self.retries += 1;
-            let now = self.sequence().await?;
-            if lost && now == expected {
-                break;
-            }
-            if now != before {
-                return Err(wrong(format!("sequence number went from {before} to {now}")));
-            }
-        }
         let waited = self.waited;
         self.wait(exposure.duration()).await?;
         loop {
@@ -62,6 +49,33 @@ impl<R: Rig> Drive<R> {
                 None => self.wait(POLL).await?,
             }
         }
+    }
+
+    /// Starts one integration, `before` being the sequence number of the photometer's latest reading, and returns that
+    /// of the reading to come.
+    ///
+    /// # Errors
+    /// A silent or failing photometer; one that another program triggers too.
+    pub async fn trigger(&mut self, before: u32, exposure: Exposure) -> Result<u32, DriveError<R::Error>> {
+        let expected = (before + 1) % SEQUENCE_MODULUS;
+        let mut patience = Patience::new(self.file.bus.silence);
+        while let Err(error) = self.rig.photometer().trigger(exposure).await {
+            let lost = error.kind() == FaultKind::NoReply;
+            patience.spend("trigger the photometer", error).await?;
+            self.retries += 1;
+            let now = self.sequence().await?;
+            if lost && now == expected {
+                break;
+            }
+            if now != before {
+                return Err(DriveError::Reading {
+                    expected,
+                    exposure,
+                    found: format!("sequence number went from {before} to {now}"),
+                });
+            }
+        }
+        Ok(expected)
     }
 
     async fn sequence(&mut self) -> Result<u32, DriveError<R::Error>> {

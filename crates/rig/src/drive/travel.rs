@@ -58,7 +58,7 @@ impl<R: Rig> Drive<R> {
     }
 
     /// Checks a motion from where the arms are: the way against the tolerant envelope, its end against the strict one.
-    fn check(&self, from: &Snapshot, to: Pose) -> Result<(), DriveError<R::Error>> {
+    pub(super) fn check(&self, from: &Snapshot, to: Pose) -> Result<(), DriveError<R::Error>> {
         let strict = &self.file.envelope;
         strict.check_pose(to).map_err(DriveError::Envelope)?;
         self.tolerant()
@@ -136,7 +136,7 @@ impl<R: Rig> Drive<R> {
     }
 
     /// Sets both arms off. The sync write is not acknowledged, so it is repeated until the goals read back.
-    async fn start(&mut self, goal: Pose) -> Result<(), DriveError<R::Error>> {
+    pub(super) async fn start(&mut self, goal: Pose) -> Result<(), DriveError<R::Error>> {
         let since = Instant::now();
         loop {
             self.retry("set the arms off", |rig| Box::pin(rig.start(goal)))

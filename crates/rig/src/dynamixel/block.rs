@@ -114,6 +114,11 @@ pub(super) fn status(bytes: &[u8]) -> DetectorStatus {
     }
 }
 
+/// The photometer's clock in the bytes of [`READING`].
+pub(super) fn ticks(bytes: &[u8]) -> u32 {
+    u32_of(bytes, READING, photometer::PRESENT_TIME)
+}
+
 /// The reading in the bytes of [`READING`]; `None` where there is none yet, or its gain step is unheard of.
 pub(super) fn reading(bytes: &[u8]) -> Option<Counts> {
     let status = status(bytes);
@@ -227,6 +232,7 @@ mod tests {
                 prop_assert_eq!(counts.sequence, numbers[0]);
                 prop_assert_eq!(counts.rgb, [numbers[2], numbers[3], numbers[4]]);
                 prop_assert_eq!(counts.ticks, numbers[6]);
+                prop_assert_eq!(ticks(&bytes), numbers[7]);
                 prop_assert_eq!(counts.temperature_c, temperature);
             }
         }

@@ -10,7 +10,7 @@ use super::node::{BROADCAST, Node, instruction};
 use super::photometer::Photometer;
 use super::register::{photometer, servo};
 use super::servo::Servo;
-use crate::{Detector, Device, Rig, RigError, RigFile, Snapshot};
+use crate::{Device, Observation, Rig, RigError, RigFile, Snapshot};
 
 /// Longest time that the photometer's Delay register takes at once (docs/photometer.md).
 const DELAY_MAX: Duration = Duration::from_secs(10);
@@ -62,13 +62,13 @@ impl Dynamixel {
         })
     }
 
-    /// State of both servos and status of the photometer in one transaction.
-    async fn bulk(&mut self) -> Result<Snapshot, RigError> {
+    /// State of both servos, and a block of the photometer that begins with its status, in one transaction.
+    async fn bulk(&mut self, photometer: Block) -> Result<(Snapshot, Vec<u8>), RigError> {
         let [light, sensor] = [&self.servos[0].node, &self.servos[1].node];
         let parts = [
             (light, block::STATE),
             (sensor, block::STATE),
-            (&self.photometer.node, block::STATUS),
+            (&self.photometer.node, photometer),
         ];
         let mut parameters = Vec::new();
         for (node, block) in parts {
@@ -82,7 +82,7 @@ impl Dynamixel {
             parameters,
             replies: parts.map(|(node, block)| (node.id, block.length)).to_vec(),
         };
-        let replies = self.bus.transact(request).await.map_err(|failure| {
+        let mut replies = self.bus.transact(request).await.map_err(|failure| {
             let guilty = parts.iter().find(|(node, _)| node.id == failure.id);
             guilty.map_or(light, |(node, _)| node).error(failure)
         })?;
@@ -105,7 +105,20 @@ impl Dynamixel {
                 snapshot.arms[arm as usize] = servo.place(servo.state().await?);
             }
         }
-        Ok(snapshot)
+        Ok((snapshot, replies.swap_remove(2).parameters))
+    }
+
+    /// Both servos and a block of the photometer that begins with its status, in as few transactions as possible.
+    async fn look(&mut self, photometer: Block) -> Result<(Snapshot, Vec<u8>), RigError> {
+        if self.servos.iter().all(|servo| servo.mapped) {
+            return self.bulk(photometer).await;
+        }
+        let [light, sensor] = &mut self.servos;
+        use crate::Actuator as _;
+        let arms = [light.location().await?, sensor.location().await?];
+        let bytes = self.photometer.node.read(photometer).await?;
+        let detector = block::status(&bytes);
+        Ok((Snapshot { arms, detector }, bytes))
     }
 
     async fn clock_is_simulated(&mut self) -> Result<bool, RigError> {
@@ -159,14 +172,15 @@ impl Rig for Dynamixel {
     }
 
     async fn snapshot(&mut self) -> Result<Snapshot, RigError> {
-        if self.servos.iter().all(|servo| servo.mapped) {
-            return self.bulk().await;
-        }
-        let [light, sensor] = &mut self.servos;
-        use crate::Actuator as _;
-        Ok(Snapshot {
-            arms: [light.location().await?, sensor.location().await?],
-            detector: self.photometer.status().await?,
+        Ok(self.look(block::STATUS).await?.0)
+    }
+
+    async fn observe(&mut self) -> Result<Observation, RigError> {
+        let (snapshot, bytes) = self.look(block::READING).await?;
+        Ok(Observation {
+            snapshot,
+            ticks: block::ticks(&bytes),
+            counts: block::reading(&bytes),
         })
     }
 

@@ -1,7 +1,7 @@
 use std::f64::consts::TAU;
 use std::time::Duration;
 
-use arms::{Limits, Profile};
+use arms::{ArmAngle, Limits, Profile};
 
 use super::block::{self, Block, State, i32_at, u32_of};
 use super::node::Node;
@@ -267,6 +267,25 @@ impl Actuator for Servo {
         self.node.write(common::BUS_WATCHDOG, &[watchdog]).await?;
         self.engaged = true;
         Ok(())
+    }
+
+    async fn steer(&mut self, goal: ArmAngle, profile: Profile) -> Result<(), RigError> {
+        // An arm that is not engaged may have no torque, and no watchdog.
+        if !self.engaged {
+            return Err(RigError::NotEngaged {
+                device: self.node.device,
+            });
+        }
+        let [velocity, acceleration] = self.settings.axis.profile_registers(profile);
+        let goal = self.settings.axis.counts(goal).round() as i32;
+        // Acceleration, velocity and goal are neighbours.
+        let registers = [
+            acceleration.to_le_bytes(),
+            velocity.to_le_bytes(),
+            goal.to_le_bytes(),
+        ]
+        .concat();
+        self.node.write(servo::PROFILE_ACCELERATION, &registers).await
     }
 
     async fn location(&mut self) -> Result<Location, RigError> {
