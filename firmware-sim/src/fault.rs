@@ -1,27 +1,36 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 /// Something that goes wrong with a device at a given moment of simulated time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+///
+/// In TOML `{ device = "sensor", at_s = 3.5, what = { stall_s = 0.2 } }`; without `at_s` at once.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Fault {
     /// Which device.
     pub device: rig::Device,
     /// When, since power-on; what lies in the past happens at once.
+    #[serde(rename = "at_s", with = "seconds", default)]
     pub at: Duration,
     /// What.
     pub what: Disturbance,
 }
 
 /// What goes wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Disturbance {
     /// The device neither hears nor answers for so long; what it was doing goes on.
+    #[serde(rename = "silence_s", with = "seconds")]
     Silence(Duration),
     /// Bits of Hardware Error Status, such as [`OVERLOAD`](Self::OVERLOAD), appear and stay until a reboot. Where the
     /// servo's Shutdown register names one of them torque goes off; any of them puts the photometer's lamp out.
     HardwareError(u8),
     /// The shaft of a servo is stuck for so long, while its profile goes on.
+    #[serde(rename = "stall_s", with = "seconds")]
     Stall(Duration),
     /// The photometer refuses the next trigger (Result Fail).
     RefusedTrigger,
@@ -57,5 +66,22 @@ impl Schedule {
     /// The first one, where it is due at `now`.
     pub(crate) fn pop(&mut self, now: Duration) -> Option<Disturbance> {
         self.0.pop_front_if(|(at, _)| *at <= now).map(|(_, what)| what)
+    }
+}
+
+/// Durations as seconds.
+mod seconds {
+    use std::time::Duration;
+
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    pub(super) fn serialize<S: Serializer>(duration: &Duration, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_f64(duration.as_secs_f64())
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Duration, D::Error> {
+        let seconds = f64::deserialize(from)?;
+        Duration::try_from_secs_f64(seconds)
+            .map_err(|_| D::Error::custom(format!("{seconds} s, allowed: 0 s and more")))
     }
 }

@@ -212,6 +212,23 @@ pub(crate) enum Command {
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
+    /// Let things go wrong in thousands of simulated captures: each must end true, or with a clear fault, safe and
+    /// resumable.
+    ///
+    /// What does not is printed as a script, cut down to the faults that it takes, and the exit code is 3.
+    Campaign {
+        /// How many captures.
+        #[arg(long, value_name = "N", default_value_t = 10_000)]
+        captures: u64,
+        /// Seed of the first one; the others follow. A fresh one unless given.
+        #[arg(long, value_name = "S", value_parser = clap::value_parser!(u64).range(..1 << 62))]
+        seed: Option<u64>,
+        /// Do one script again.
+        #[arg(long, value_name = "FILE", conflicts_with_all = ["captures", "seed"])]
+        replay: Option<PathBuf>,
+        #[command(flatten)]
+        output: Output,
+    },
     /// Print the script with which a shell completes these commands.
     Completions {
         /// The shell.

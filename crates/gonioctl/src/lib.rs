@@ -3,6 +3,7 @@
 //! Data goes to stdout, talk to stderr; the exit code says how it ended.
 
 mod calibrate;
+mod campaign;
 mod cli;
 mod conform;
 mod daemon;
@@ -117,6 +118,15 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             output,
         } => eval::eval(&truth, &estimate, output.json)?,
         Command::Study { study, quick, out } => study::study(study.as_deref(), quick, out)?,
+        Command::Campaign {
+            captures,
+            seed,
+            replay,
+            output,
+        } => match replay {
+            Some(script) => return campaign::replay(&script, output.json),
+            None => return campaign::campaign(captures, seed, output.json),
+        },
         Command::Completions { shell } => manual::completions(shell)?,
         Command::Man { directory } => manual::man(&directory)?,
         Command::Reconstruct { run, output } => reconstruct::reconstruct(run, output.json)?,

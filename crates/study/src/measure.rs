@@ -1,8 +1,7 @@
 use std::sync::Arc;
 
-use async_trait::async_trait;
 use brdf::Brdf;
-use capture::{Command, Header, Journal, JournalError, Outcome, Record};
+use capture::{Command, Header, MemoryJournal, Outcome, Record};
 use firmware_sim::Bench;
 use firmware_sim::in_process::InProcessRig;
 use pdv::Observation;
@@ -86,7 +85,7 @@ async fn records(job: &Job, file: &RigFile, specimen: Arc<dyn Brdf>) -> Result<(
         plan: sweep::plan(job, &mechanics)?,
         started: String::new(),
     };
-    let mut journal = Memory(vec![Record::Header(header)]);
+    let mut journal = MemoryJournal(vec![Record::Header(header)]);
     let mut drive = Drive::new(rig, file.clone());
     let (_sender, control) = watch::channel(Command::Run);
     let outcome = capture::run(&mut drive, &mut journal, control, &mut |_| ())
@@ -96,20 +95,5 @@ async fn records(job: &Job, file: &RigFile, specimen: Arc<dyn Brdf>) -> Result<(
         Outcome::Done => Ok((journal.0, mechanics.transaction_s)),
         Outcome::Stopped => Err(failed("it was stopped".to_owned())),
         Outcome::Failed { fault } => Err(failed(fault)),
-    }
-}
-
-/// A journal that nobody needs after the capture.
-struct Memory(Vec<Record>);
-
-#[async_trait]
-impl Journal for Memory {
-    async fn append(&mut self, record: &Record) -> Result<(), JournalError> {
-        self.0.push(record.clone());
-        Ok(())
-    }
-
-    fn records(&self) -> &[Record] {
-        &self.0
     }
 }

@@ -3,15 +3,13 @@
 use std::sync::Arc;
 
 use brdf::Brdf;
-use capture::{Command, Header, Outcome, Record};
+use capture::{Command, Header, MemoryJournal, Outcome, Record};
 use firmware_sim::Bench;
 use firmware_sim::in_process::InProcessRig;
 use report::Standard;
 use rig::{Certificate, Drive, Rig, RigFile};
 use sweep::{Job, Plan};
 use tokio::sync::watch;
-
-use crate::campaign::Memory;
 
 /// A rig with what was found out about it.
 pub(crate) struct Laboratory {
@@ -68,7 +66,7 @@ impl Laboratory {
         let mut rig = InProcessRig::over(bench, &self.file);
         let start = rig.snapshot().await.expect("all devices answer").pose();
         let plan = plan(&capture::mechanics(&self.file, Some(start))).expect("possible on this rig");
-        let mut journal = Memory(vec![Record::Header(Header {
+        let mut journal = MemoryJournal(vec![Record::Header(Header {
             run: "test".to_owned(),
             version: "0".to_owned(),
             job: job.to_owned(),

@@ -2,7 +2,4 @@
 
 mod absolute;
 mod bench;
-#[path = "../../examples/campaign/campaign.rs"]
-mod campaign;
 mod coverage;
-mod faults;

@@ -1,0 +1,70 @@
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use goniod::Status;
+use study::{Campaign, Script, Wrong};
+
+use crate::{exit, print};
+
+/// Fresh seeds are below this, so that they are short enough to be typed.
+const SEEDS: u64 = 1_000_000_000;
+
+/// Carries out a campaign and prints each capture that went wrong as a script to replay.
+///
+/// # Errors
+/// Stdout refuses.
+pub(crate) fn campaign(captures: u64, seed: Option<u64>, as_json: bool) -> anyhow::Result<ExitCode> {
+    let fresh = || {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        since.as_micros() as u64 % SEEDS
+    };
+    let seed = seed.unwrap_or_else(fresh);
+    print::say(format_args!("{captures} captures, seed {seed}"));
+    let begun = Instant::now();
+    let told = AtomicU64::new(0);
+    let campaigned = Campaign { captures, seed }.run(&|done, of| {
+        let tenth = 10 * done / of.max(1);
+        if told.fetch_max(tenth, Ordering::Relaxed) < tenth {
+            print::say(format_args!("{done} of {of}"));
+        }
+    });
+    print::say(format_args!(
+        "{} captures with {} faults in {:.1} s: {} executions, {} readings true within their uncertainty",
+        campaigned.captures,
+        campaigned.faults,
+        begun.elapsed().as_secs_f64(),
+        campaigned.executions,
+        campaigned.readings
+    ));
+    if as_json {
+        print::json(&campaigned)?;
+    } else {
+        for Wrong { script, why } in &campaigned.wrong {
+            print::line(format_args!("# {}\n{script}", why.replace('\n', " ")))?;
+        }
+    }
+    Ok(verdict(campaigned.wrong.is_empty()))
+}
+
+/// Carries out one script.
+///
+/// # Errors
+/// The file is no script; stdout refuses.
+pub(crate) fn replay(script: &Path, as_json: bool) -> anyhow::Result<ExitCode> {
+    let carried = Script::read(script)?.carry();
+    match &carried {
+        Ok(carried) if as_json => print::json(carried)?,
+        Ok(carried) => print::line(format_args!(
+            "{} executions, {} readings true within their uncertainty",
+            carried.executions, carried.readings
+        ))?,
+        Err(why) => print::line(why)?,
+    }
+    Ok(verdict(carried.is_ok()))
+}
+
+fn verdict(right: bool) -> ExitCode {
+    exit::code(if right { Status::Done } else { Status::Rig })
+}

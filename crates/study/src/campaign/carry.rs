@@ -1,0 +1,133 @@
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::time::Duration;
+
+use capture::{Command, Header, MemoryJournal, Outcome, Record};
+use rig::dynamixel::register::{Register, photometer, servo};
+use rig::{Device, Drive, Rig, RigFile};
+use sweep::Job;
+use tokio::sync::watch;
+
+use super::in_process::InProcess;
+use super::truth::whole;
+use super::{Carried, Script};
+
+/// A job of all kinds of steps, in seconds of rig time.
+const JOB: &str = "[[plane]]\ntheta_r_deg = 60\nreadings = 8\n[arc]\nreadings = 5\n";
+/// A diffuse specimen with a lobe.
+const SPECIMEN: &str = "blue-rubber";
+/// Executions after which a run must be complete: each fault ends one at most, and a third of them is to spare.
+const MAX_EXECUTIONS: u64 = 8;
+/// Time in which one execution must end, come what may.
+const HANG: Duration = Duration::from_secs(3600);
+/// After this every silence, stall, watchdog and boot is over.
+pub(super) const REST: Duration = Duration::from_secs(12);
+/// The devices.
+pub(super) const DEVICES: [Device; 3] = [Device::Light, Device::Sensor, Device::Photometer];
+
+/// A simulated rig that captures are carried out on, with a view behind it.
+pub(super) trait Bench: Sized {
+    /// What drives it.
+    type Rig: Rig;
+
+    /// The rig of a script, its faults lying in wait.
+    fn new(script: &Script, file: &RigFile) -> Result<(Self, Self::Rig), String>;
+
+    /// Lets [`REST`] pass while nobody speaks to the rig.
+    async fn rest(&self);
+
+    /// A register, past the bus.
+    fn peek(&self, device: Device, register: Register) -> Result<i64, String>;
+
+    /// Mends what is broken for good, as a technician would, and gives the rig back.
+    fn mend(&mut self, rig: Drive<Self::Rig>, file: &RigFile) -> Result<Drive<Self::Rig>, String>;
+}
+
+/// Carries a script's capture out.
+pub(super) fn carry(script: &Script) -> Result<Carried, String> {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_time()
+        .start_paused(true)
+        .build()
+        .map_err(words)?;
+    let carried = catch_unwind(AssertUnwindSafe(|| {
+        runtime.block_on(carry_out::<InProcess>(script))
+    }));
+    carried.unwrap_or_else(|panic| {
+        let text = panic.downcast_ref::<String>().cloned();
+        let text = text.or_else(|| panic.downcast_ref::<&str>().map(|&text| text.to_owned()));
+        Err(format!("panic: {}", text.unwrap_or_default()))
+    })
+}
+
+async fn carry_out<B: Bench>(script: &Script) -> Result<Carried, String> {
+    let text = rig_file(script);
+    let file = RigFile::parse(&text, "campaign".as_ref()).map_err(words)?;
+    let specimen = brdf::specimen(SPECIMEN).map_err(words)?;
+    let (mut bench, mut rig) = B::new(script, &file)?;
+    let start = rig.snapshot().await.map_err(words)?.pose();
+    let job = Job::parse(JOB, "campaign").map_err(words)?;
+    let plan = sweep::plan(&job, &capture::mechanics(&file, Some(start))).map_err(words)?;
+    let steps = plan.steps.len();
+    let mut journal = MemoryJournal(vec![Record::Header(Header {
+        run: script.seed.to_string(),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        job: JOB.to_owned(),
+        rig: text,
+        plan,
+        started: String::new(),
+        certificate: None,
+    })]);
+    let mut drive = Drive::new(rig, file.clone());
+    let (_operator, control) = watch::channel(Command::Run);
+    let mut last = String::new();
+    for execution in 1..=MAX_EXECUTIONS {
+        let mut unseen = |_| ();
+        let run = capture::run(&mut drive, &mut journal, control.clone(), &mut unseen);
+        let outcome = tokio::time::timeout(HANG, run)
+            .await
+            .map_err(|_| format!("execution {execution} hangs"))?
+            .map_err(words)?;
+        bench.rest().await;
+        safe(&bench).map_err(|why| format!("after {outcome:?}: {why}"))?;
+        match outcome {
+            Outcome::Done => {
+                return Ok(Carried {
+                    executions: execution,
+                    readings: whole(&journal.0, steps, &file, &*specimen)?,
+                });
+            }
+            Outcome::Stopped => return Err("stopped by nobody".to_owned()),
+            Outcome::Failed { fault } if fault.is_empty() => return Err("a fault without words".to_owned()),
+            Outcome::Failed { fault } => last = fault,
+        }
+        drive = bench.mend(drive, &file)?;
+        bench.rest().await;
+    }
+    Err(format!(
+        "not complete after {MAX_EXECUTIONS} executions; last: {last}"
+    ))
+}
+
+/// The rig of a script. Its seed is half the script's, since TOML's numbers have 63 bits.
+fn rig_file(script: &Script) -> String {
+    format!("[sim]\nspecimen = \"{SPECIMEN}\"\nseed = {}\n", script.seed >> 1)
+}
+
+/// Lamp off and both arms standing.
+fn safe(bench: &impl Bench) -> Result<(), String> {
+    if bench.peek(Device::Photometer, photometer::LAMP_ENABLE)? != 0 {
+        return Err("the lamp is on".to_owned());
+    }
+    for device in [Device::Light, Device::Sensor] {
+        if bench.peek(device, servo::MOVING)? != 0 {
+            return Err(format!("the {device} moves"));
+        }
+    }
+    Ok(())
+}
+
+/// An error in words, with its causes.
+pub(super) fn words(error: impl std::error::Error) -> String {
+    let causes = std::iter::successors(error.source(), |error| error.source());
+    causes.fold(error.to_string(), |text, cause| format!("{text}: {cause}"))
+}

@@ -1,0 +1,28 @@
+//! Captures with random faults end true, or with a clear fault, safe and resumable.
+
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use study::{Campaign, Wrong};
+
+/// A fresh seed each time: what it finds is printed as a script for `gonioctl campaign --replay`.
+fn campaign(captures: u64) {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
+    let seed = since.as_micros() as u64 % 1_000_000_000;
+    println!("seed {seed}");
+    let campaigned = Campaign { captures, seed }.run(&|_, _| ());
+    assert_eq!(campaigned.captures, captures);
+    assert!(
+        campaigned.faults >= captures && campaigned.executions > captures,
+        "{campaigned:?}"
+    );
+    let wrong = campaigned.wrong.iter();
+    let wrong: Vec<_> = wrong
+        .map(|Wrong { script, why }| format!("# {why}\n{script}"))
+        .collect();
+    assert!(wrong.is_empty(), "seed {seed}\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn random_faults_of_devices_end_in_true_readings_or_a_clear_fault() {
+    campaign(500);
+}
