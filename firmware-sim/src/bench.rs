@@ -1,3 +1,4 @@
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -9,11 +10,12 @@ use rand_chacha::ChaCha8Rng;
 use rig::{Axis, RigFile};
 
 use crate::lamp::Lamp;
+use crate::mishaps::Mishaps;
 use crate::optics::Optics;
 use crate::photodiodes::{Exposed, Light, Photodiodes};
 use crate::photometer::{Integration, Photometer};
 use crate::servo::{Model, Servo};
-use crate::{Clock, Device, Fault, Settings, SimError, baud, photometer, servo};
+use crate::{Clock, Device, Fault, Mishap, Settings, SimError, baud, photometer, servo};
 
 /// Stream of random numbers for what is drawn once; readings use the streams 0, 1, …
 const ONCE: u64 = u64::MAX;
@@ -41,6 +43,7 @@ pub struct Bench {
     photometer: Photometer,
     photodiodes: Photodiodes,
     optics: Optics,
+    mishaps: Mishaps,
 }
 
 impl Bench {
@@ -92,8 +95,12 @@ impl Bench {
                 rig.calibration.filling,
                 [amounts.source_aperture_deg, amounts.detector_aperture_deg].map(f64::to_radians),
             ),
+            mishaps: Mishaps::new(settings.mishaps.clone(), settings.seed, Duration::ZERO)?,
         };
         bench.set_clock(settings.clock);
+        for fault in settings.faults {
+            bench.schedule(fault);
+        }
         Ok(bench)
     }
 
@@ -117,8 +124,15 @@ impl Bench {
     pub fn advance_to(&mut self, t: Duration) {
         while let Some(integration) = self.photometer.integration().filter(|running| running.end <= t) {
             self.pass(integration.end);
-            let exposed = self.expose(integration);
-            self.photometer.complete(exposed);
+            // A fault may have come in the way.
+            if self
+                .photometer
+                .integration()
+                .is_some_and(|running| running.end <= self.now)
+            {
+                let exposed = self.expose(integration);
+                self.photometer.complete(exposed);
+            }
         }
         self.pass(t);
         let start = self.photometer.integration().map(|running| running.start);
@@ -130,6 +144,9 @@ impl Bench {
     }
 
     fn pass(&mut self, t: Duration) {
+        while let Some(fault) = self.mishaps.pop(t) {
+            self.put(fault);
+        }
         self.now = self.now.max(t);
         self.photometer.advance_to(t);
         for servo in &mut self.servos {
@@ -171,6 +188,7 @@ impl Bench {
             light.next_event(),
             sensor.next_event(),
             self.photometer.next_event(),
+            self.mishaps.next(),
         ]
         .into_iter()
         .flatten()
@@ -179,13 +197,26 @@ impl Bench {
 
     /// Has something go wrong at a given time.
     pub fn schedule(&mut self, fault: Fault) {
+        self.put(fault);
+        // What is due already happens now.
+        self.advance_to(self.now);
+    }
+
+    /// Changes how often mishaps happen from now on, per hour; those that are not named do not happen any more.
+    ///
+    /// # Errors
+    /// A rate out of its range, 0 … 3600 per hour.
+    pub fn set_mishaps(&mut self, rates: BTreeMap<Mishap, f64>) -> Result<(), SimError> {
+        self.mishaps = Mishaps::new(rates, self.photodiodes.seed, self.now)?;
+        Ok(())
+    }
+
+    fn put(&mut self, fault: Fault) {
         match fault.device {
             rig::Device::Light => self.servos[0].schedule(fault.at, fault.what),
             rig::Device::Sensor => self.servos[1].schedule(fault.at, fault.what),
             rig::Device::Photometer => self.photometer.schedule(fault.at, fault.what),
         }
-        // What is due already happens now.
-        self.advance_to(self.now);
     }
 
     /// Where the arms really are, behind lag and backlash.
@@ -213,7 +244,12 @@ impl Bench {
             gain: rig::Gain::ALL[usize::from(integration.gain_step)].factor(),
             temperature_c: self.photometer.temperature_c((from_s + to_s) / 2.0),
         };
-        self.photodiodes.expose(light, integration.serial)
+        let mut exposed = self.photodiodes.expose(light, integration.serial);
+        if self.photometer.glares() {
+            exposed.rgb = [self.photodiodes.full_scale; 3];
+            exposed.saturated = true;
+        }
+        exposed
     }
 
     /// ∫ lamp · f · cos dt, s/sr: exact while the arms rest, by quadrature between the breaks of their motion

@@ -29,7 +29,8 @@ pub enum Disturbance {
     /// Bits of Hardware Error Status, such as [`OVERLOAD`](Self::OVERLOAD), appear and stay until a reboot. Where the
     /// servo's Shutdown register names one of them torque goes off; any of them puts the photometer's lamp out.
     HardwareError(u8),
-    /// The shaft of a servo is stuck for so long, while its profile goes on.
+    /// The shaft of a servo is stuck for so long, while its profile goes on; the photometer's running integration
+    /// takes so much longer.
     #[serde(rename = "stall_s", with = "seconds")]
     Stall(Duration),
     /// The photometer refuses the next trigger (Result Fail).
@@ -38,9 +39,22 @@ pub enum Disturbance {
     LostAcknowledgement,
     /// The device's supply sags for a moment: it restarts, and its RAM is lost.
     Reboot,
+    /// The bus watchdog trips although somebody spoke: a servo stands and refuses goals, the photometer's lamp goes
+    /// out, until 0 is written to it.
+    WatchdogTrip,
+    /// The supply of a servo sinks to [`SAG_V`](Self::SAG_V) for so long; only Present Input Voltage shows it.
+    #[serde(rename = "sag_s", with = "seconds")]
+    Sag(Duration),
+    /// So much light gets in from outside for so long that every channel is full.
+    #[serde(rename = "glare_s", with = "seconds")]
+    Glare(Duration),
+    /// The device answers under this id from now on, as one that was set up wrongly.
+    Id(u8),
 }
 
 impl Disturbance {
+    /// Supply voltage of a servo that sags, V: above the 9.5 V at which it complains.
+    pub const SAG_V: f64 = 10.0;
     /// Overload, which shuts a servo down.
     pub const OVERLOAD: Self = Self::HardwareError(1 << 5);
     /// Overheating, which shuts a servo down.

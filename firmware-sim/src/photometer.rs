@@ -56,6 +56,7 @@ pub(crate) struct Photometer {
     heard: Duration,
     deaf_until: Duration,
     silent_until: Duration,
+    glare_until: Duration,
     integration: Option<Integration>,
     triggers: u64,
     delay: Option<Duration>,
@@ -78,6 +79,7 @@ impl Photometer {
             heard: Duration::ZERO,
             deaf_until: Duration::ZERO,
             silent_until: Duration::ZERO,
+            glare_until: Duration::ZERO,
             integration: None,
             triggers: 0,
             delay: None,
@@ -118,7 +120,8 @@ impl Photometer {
 
     /// When something happens by itself next.
     pub(crate) fn next_event(&self) -> Option<Duration> {
-        [Some(self.deaf_until), Some(self.silent_until)]
+        [self.deaf_until, self.silent_until, self.glare_until]
+            .map(Some)
             .into_iter()
             .chain([
                 self.watchdog(),
@@ -146,8 +149,7 @@ impl Photometer {
         {
             self.now = self.now.max(at);
             if self.watchdog() == Some(at) {
-                self.table.set(reg::BUS_WATCHDOG, TRIPPED);
-                self.switch_lamp(false);
+                self.trip();
             } else if let Some(what) = self.faults.pop(at) {
                 self.suffer(what);
             }
@@ -166,9 +168,28 @@ impl Photometer {
             Disturbance::RefusedTrigger => self.refuses_trigger = true,
             Disturbance::LostAcknowledgement => self.loses_acknowledgement = true,
             Disturbance::Reboot => self.reboot(),
+            Disturbance::WatchdogTrip => self.trip(),
+            Disturbance::Stall(duration) => {
+                if let Some(integration) = &mut self.integration {
+                    integration.end += duration;
+                }
+            }
+            Disturbance::Glare(duration) => self.glare_until = self.now + duration,
+            Disturbance::Id(id) => self.table.set(reg::ID, id.into()),
             // A servo's.
-            Disturbance::Stall(_) => {}
+            Disturbance::Sag(_) => {}
         }
+    }
+
+    /// The bus watchdog: the lamp is out, and stays out.
+    fn trip(&mut self) {
+        self.table.set(reg::BUS_WATCHDOG, TRIPPED);
+        self.switch_lamp(false);
+    }
+
+    /// Whether light from outside fills every channel.
+    pub(crate) fn glares(&self) -> bool {
+        self.now < self.glare_until
     }
 
     fn switch_lamp(&mut self, on: bool) {

@@ -1,14 +1,15 @@
 use std::error::Error;
-use std::io::{IsTerminal, Write};
+use std::io::{BufRead, IsTerminal, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
 use rig::RigFile;
 use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::mpsc;
 use tracing_subscriber::EnvFilter;
 
-use crate::{Bench, Clock, Server, WireSettings};
+use crate::{Bench, Clock, Order, Server, WireSettings};
 
 /// A simulated Dynamixel bus on a pseudo-terminal: two servo arms (ids 1 and 2), a photometer (id 3), a lamp and a
 /// specimen. Prints the path to open; runs until it is interrupted.
@@ -28,6 +29,10 @@ struct Arguments {
     /// Let time go by the bytes on the wire instead of the clock on the wall.
     #[arg(long)]
     wire_time: bool,
+    /// Take orders from stdin while it runs, a line of TOML each, such as "wire.drop_reply = 0.1", "mishaps.reboot = 60",
+    /// "fault = { device = 'sensor', what = 'overload' }", "plugged = false". docs/simulator.md has them all.
+    #[arg(long)]
+    orders: bool,
 }
 
 /// Runs `firmware-sim` with the arguments of this process: serves until SIGINT or SIGTERM, then returns 0; 2 for bad
@@ -83,12 +88,48 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
         }
         writeln!(std::io::stdout(), "{}", server.path().display())?;
         tracing::info!(wire_time = arguments.wire_time, "serving");
-        tokio::select! {
-            _ = interrupted.recv() => {}
-            _ = terminated.recv() => {}
+        let mut orders = if arguments.orders {
+            listen()
+        } else {
+            mpsc::channel(1).1
+        };
+        loop {
+            tokio::select! {
+                _ = interrupted.recv() => break,
+                _ = terminated.recv() => break,
+                Some(line) = orders.recv() => obey(&line, &mut rig, &mut server),
+            }
         }
         let counters = server.counters();
         tracing::info!(packets = counters.packets, damaged = counters.damaged, "stopped");
         Ok(())
     })
+}
+
+/// Lines from stdin, until it ends.
+fn listen() -> mpsc::Receiver<String> {
+    let (sender, lines) = mpsc::channel(16);
+    // No task: a read from stdin cannot be cancelled, and would hold the runtime back at the end.
+    std::thread::spawn(move || {
+        for line in std::io::stdin().lock().lines().map_while(Result::ok) {
+            if sender.blocking_send(line).is_err() {
+                break;
+            }
+        }
+    });
+    lines
+}
+
+/// Carries an order out; the answer is a line on stdout: `ok`, with the path where the port has a new one, or what is
+/// wrong with the order.
+fn obey(line: &str, rig: &mut RigFile, server: &mut Server) {
+    let before = server.path().to_owned();
+    let result = line.parse().and_then(|order: Order| order.carry_out(rig, server));
+    let answer = match result {
+        Ok(()) if server.path() != before => format!("ok {}", server.path().display()),
+        Ok(()) => "ok".to_owned(),
+        Err(error) => format!("refused: {error}"),
+    };
+    // Nobody may be listening.
+    let _ = writeln!(std::io::stdout(), "{answer}");
 }

@@ -67,6 +67,7 @@ pub(crate) struct Servo {
     heard: Duration,
     deaf_until: Duration,
     silent_until: Duration,
+    sags_until: Duration,
     stalled_until: Option<Duration>,
     faults: Schedule,
 }
@@ -91,6 +92,7 @@ impl Servo {
             heard: Duration::ZERO,
             deaf_until: Duration::ZERO,
             silent_until: Duration::ZERO,
+            sags_until: Duration::ZERO,
             stalled_until: None,
             faults: Schedule::default(),
         };
@@ -128,7 +130,8 @@ impl Servo {
         let motion_s = self.profile.end_s().max(self.shaft.end_s());
         // Rounded up, so that the motion is over by then.
         let motion = Duration::from_nanos((motion_s * 1e9).ceil() as u64);
-        [Some(motion), Some(self.deaf_until), Some(self.silent_until)]
+        [motion, self.deaf_until, self.silent_until, self.sags_until]
+            .map(Some)
             .into_iter()
             .chain([self.watchdog(), self.stalled_until, self.faults.next()])
             .flatten()
@@ -153,8 +156,7 @@ impl Servo {
         {
             self.now = self.now.max(at);
             if self.watchdog() == Some(at) {
-                self.table.set(reg::BUS_WATCHDOG, TRIPPED);
-                self.stand();
+                self.trip();
             } else if self.stalled_until == Some(at) {
                 self.release();
             } else if let Some(what) = self.faults.pop(at) {
@@ -181,9 +183,18 @@ impl Servo {
                 self.shaft.jump(now_s, self.shaft.at(now_s).0);
             }
             Disturbance::Reboot => self.reboot(),
+            Disturbance::WatchdogTrip => self.trip(),
+            Disturbance::Sag(duration) => self.sags_until = self.now + duration,
+            Disturbance::Id(id) => self.table.set(reg::ID, id.into()),
             // The photometer's.
-            Disturbance::RefusedTrigger | Disturbance::LostAcknowledgement => {}
+            Disturbance::RefusedTrigger | Disturbance::LostAcknowledgement | Disturbance::Glare(_) => {}
         }
+    }
+
+    /// The bus watchdog: the arm stands, and goals are refused.
+    fn trip(&mut self) {
+        self.table.set(reg::BUS_WATCHDOG, TRIPPED);
+        self.stand();
     }
 
     /// Whether a hardware error that the Shutdown register names has taken the torque, until a reboot.

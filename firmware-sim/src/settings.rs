@@ -1,3 +1,4 @@
+use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::time::Duration;
@@ -6,7 +7,8 @@ use arms::Pose;
 use rig::RigFile;
 use serde::Deserialize;
 
-use crate::{Imperfections, SimError};
+use crate::mishaps::Rates;
+use crate::{Fault, Imperfections, Mishap, SimError};
 
 /// How a simulated bench behind the wire keeps time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -35,6 +37,10 @@ pub struct Settings {
     pub start: Pose,
     /// Temperature of the room, °C.
     pub ambient_c: f64,
+    /// What goes wrong with the devices at given times.
+    pub faults: Vec<Fault>,
+    /// How often they fail by chance, per hour.
+    pub mishaps: BTreeMap<Mishap, f64>,
 }
 
 #[derive(Deserialize)]
@@ -50,6 +56,10 @@ struct Raw {
     /// Faults on the wire, which the wire reads itself.
     #[serde(rename = "wire")]
     _wire: Option<serde::de::IgnoredAny>,
+    #[serde(default)]
+    fault: Vec<Fault>,
+    #[serde(default)]
+    mishaps: Rates,
     specimen: Option<String>,
     seed: Option<i64>,
     clock: Option<Clock>,
@@ -122,6 +132,8 @@ impl Settings {
             clock: raw.clock.unwrap_or(Clock::Wire),
             specimen: raw.specimen.unwrap_or_else(|| "gold-paint".to_owned()),
             start,
+            faults: raw.fault,
+            mishaps: raw.mishaps,
         })
     }
 }

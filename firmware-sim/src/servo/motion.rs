@@ -3,6 +3,7 @@
 use arms::Profile;
 
 use super::{Servo, TURN, reg};
+use crate::Disturbance;
 use crate::table::Table;
 
 /// Unit of velocity registers, 0.229 rpm, in counts/s.
@@ -195,7 +196,9 @@ impl Servo {
         table.set(reg::PRESENT_POSITION, present);
         table.set(reg::VELOCITY_TRAJECTORY, speed(planned_velocity));
         table.set(reg::POSITION_TRAJECTORY, self.shown(planned));
-        table.set(reg::PRESENT_VOLTAGE, VOLTAGE);
+        let sags = self.now < self.sags_until;
+        let sag = (Disturbance::SAG_V * 10.0) as i64;
+        table.set(reg::PRESENT_VOLTAGE, if sags { sag } else { VOLTAGE });
         table.set(
             reg::PRESENT_TEMPERATURE,
             (self.fitting.ambient_c + warmth).round() as i64,

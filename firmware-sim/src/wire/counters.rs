@@ -21,6 +21,8 @@ pub struct Counters {
     pub replies: u64,
     /// Status packets that a fault changed or made late.
     pub hurt: u64,
+    /// Requests that a fault changed or swallowed.
+    pub requests_hurt: u64,
     /// Status packets that a fault swallowed.
     pub dropped: u64,
 }

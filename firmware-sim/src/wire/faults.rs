@@ -17,6 +17,10 @@ pub struct WireFaults {
     pub duplicate_reply: f64,
     /// Per reply: it ends early.
     pub truncate_reply: f64,
+    /// Per reply: its first bytes are lost, as behind an adapter that is slow to turn round.
+    pub behead_reply: f64,
+    /// Per reply: the rest of it comes later by [`late_by`](Self::late_by).
+    pub split_reply: f64,
     /// Per reply: up to eight stray bytes come before it.
     pub noise: f64,
     /// Per reply: its length field is 0, 1 or 65,535, CRC and all.
@@ -25,8 +29,14 @@ pub struct WireFaults {
     pub wrong_id: f64,
     /// Per reply: it comes later by [`late_by`](Self::late_by).
     pub late_reply: f64,
-    /// How late a late reply is.
+    /// How late a late reply, the rest of a split one, and what follows a busy port are.
     pub late_by: Duration,
+    /// Per byte of a request: it arrives with other bits.
+    pub corrupt_request: f64,
+    /// Per request: it does not arrive.
+    pub drop_request: f64,
+    /// Per request: the port is busy and takes it, and all after it, only after [`late_by`](Self::late_by).
+    pub busy: f64,
     /// The adapter returns what the host sends.
     pub echo: bool,
     /// Ids cut off the bus, each from a time of the bench on: they hear nothing and say nothing.
@@ -47,10 +57,20 @@ impl WireFaults {
         self.silent.get(&id).is_some_and(|&from| now >= from)
     }
 
-    /// Sends a reply through the faults; `None` is one that does not arrive.
-    pub(crate) fn deliver(&self, reply: &[u8], rng: &mut ChaCha8Rng) -> Option<Delivery> {
-        if rng.random_bool(self.drop_reply) {
+    /// Sends a request through the faults; `None` is one that does not arrive.
+    pub(crate) fn take(&self, request: &[u8], rng: &mut ChaCha8Rng) -> Option<Vec<u8>> {
+        if rng.random_bool(self.drop_request) {
             return None;
+        }
+        let mut bytes = request.to_vec();
+        corrupt(&mut bytes, self.corrupt_request, rng);
+        Some(bytes)
+    }
+
+    /// Sends a reply through the faults; none at all is one that does not arrive, two are one in two parts.
+    pub(crate) fn deliver(&self, reply: &[u8], rng: &mut ChaCha8Rng) -> Vec<Delivery> {
+        if rng.random_bool(self.drop_reply) {
+            return Vec::new();
         }
         let mut bytes = reply.to_vec();
         if rng.random_bool(self.wrong_id) {
@@ -62,13 +82,12 @@ impl WireFaults {
                 bytes[5..7].copy_from_slice(&length.to_le_bytes());
             });
         }
-        for byte in &mut bytes {
-            if rng.random_bool(self.corrupt_byte) {
-                *byte ^= rng.random_range(1..=0xFF);
-            }
-        }
+        corrupt(&mut bytes, self.corrupt_byte, rng);
         if rng.random_bool(self.truncate_reply) {
             bytes.truncate(rng.random_range(1..bytes.len()));
+        }
+        if rng.random_bool(self.behead_reply) {
+            bytes.drain(..rng.random_range(1..=bytes.len()));
         }
         if rng.random_bool(self.duplicate_reply) {
             bytes.extend_from_within(..);
@@ -82,7 +101,24 @@ impl WireFaults {
         } else {
             Duration::ZERO
         };
-        Some(Delivery { bytes, late })
+        let mut parts = vec![Delivery { bytes, late }];
+        if parts[0].bytes.len() > 1 && rng.random_bool(self.split_reply) {
+            let at = rng.random_range(1..parts[0].bytes.len());
+            let rest = parts[0].bytes.split_off(at);
+            parts.push(Delivery {
+                bytes: rest,
+                late: late + self.late_by,
+            });
+        }
+        parts
+    }
+}
+
+fn corrupt(bytes: &mut [u8], rate: f64, rng: &mut ChaCha8Rng) {
+    for byte in bytes {
+        if rng.random_bool(rate) {
+            *byte ^= rng.random_range(1..=0xFF);
+        }
     }
 }
 
@@ -108,7 +144,7 @@ mod tests {
         Packet::status(1, 0, &[0, 8, 0, 0]).encode()
     }
 
-    fn deliveries(faults: &WireFaults, seed: u64) -> Vec<Option<Delivery>> {
+    fn deliveries(faults: &WireFaults, seed: u64) -> Vec<Vec<Delivery>> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         (0..REPLIES).map(|_| faults.deliver(&reply(), &mut rng)).collect()
     }
@@ -125,10 +161,10 @@ mod tests {
 
     #[test]
     fn a_perfect_wire_changes_nothing() {
-        let clean = Some(Delivery {
+        let clean = vec![Delivery {
             bytes: reply(),
             late: Duration::ZERO,
-        });
+        }];
         assert!(
             deliveries(&WireFaults::default(), 1)
                 .into_iter()
@@ -164,7 +200,10 @@ mod tests {
             let mut faults = WireFaults::default();
             change(&mut faults);
             let mut rng = ChaCha8Rng::seed_from_u64(3);
-            faults.deliver(&reply(), &mut rng).unwrap()
+            let [delivery] = &faults.deliver(&reply(), &mut rng)[..] else {
+                panic!("it arrives in one part");
+            };
+            delivery.clone()
         };
         let clean = reply();
         let wrong_id = Packet::decode(&with(|faults| faults.wrong_id = 1.0).bytes).unwrap();
@@ -178,6 +217,8 @@ mod tests {
             with(|faults| faults.duplicate_reply = 1.0).bytes,
             [clean.clone(), clean.clone()].concat()
         );
+        let beheaded = with(|faults| faults.behead_reply = 1.0).bytes;
+        assert!(beheaded.len() < clean.len() && clean.ends_with(&beheaded));
         let noisy = with(|faults| faults.noise = 1.0).bytes;
         assert!(noisy.len() > clean.len() && noisy.ends_with(&clean));
         let late = with(|faults| {
@@ -191,6 +232,40 @@ mod tests {
                 late: Duration::from_millis(40)
             }
         );
+    }
+
+    #[test]
+    fn a_split_reply_comes_whole_in_the_end() {
+        let faults = WireFaults {
+            split_reply: 1.0,
+            late_by: Duration::from_millis(7),
+            ..WireFaults::default()
+        };
+        for parts in deliveries(&faults, 4) {
+            let [first, rest] = &parts[..] else {
+                panic!("{parts:?}");
+            };
+            assert_eq!([&first.bytes[..], &rest.bytes].concat(), reply());
+            assert_eq!((first.late, rest.late), (Duration::ZERO, faults.late_by));
+        }
+    }
+
+    #[test]
+    fn requests_are_lost_and_damaged_at_their_rates() {
+        let faults = WireFaults {
+            drop_request: 0.05,
+            corrupt_request: 0.02,
+            ..WireFaults::default()
+        };
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let request = Packet::status(1, 0, &[0; 9]).encode();
+        let taken: Vec<_> = (0..REPLIES)
+            .filter_map(|_| faults.take(&request, &mut rng))
+            .collect();
+        assert_rate("dropped", REPLIES - taken.len(), REPLIES, 0.05);
+        let wrong = |bytes: &Vec<u8>| bytes.iter().zip(&request).filter(|(a, b)| a != b).count();
+        let bytes = taken.len() * request.len();
+        assert_rate("wrong bytes", taken.iter().map(wrong).sum(), bytes, 0.02);
     }
 
     #[test]

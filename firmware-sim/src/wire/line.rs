@@ -1,6 +1,7 @@
+use std::collections::VecDeque;
 use std::time::Duration;
 
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::answer::Slot;
@@ -15,21 +16,24 @@ const BAUD_TOLERANCE: f64 = 0.03;
 
 /// Bytes for the host, and when they are due.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Outgoing {
+pub struct Outgoing {
     /// Host time, since the line was opened.
-    pub(crate) due: Duration,
-    pub(crate) bytes: Vec<u8>,
+    pub due: Duration,
+    /// As they stand on the wire.
+    pub bytes: Vec<u8>,
 }
 
 /// The half-duplex line between host and devices: knows how long bytes take, and moves the bench's time.
 ///
 /// Bytes and times are arguments; it reads no clock and touches no terminal.
-pub(crate) struct Line {
+pub struct Line {
     bench: Bench,
     /// Bench time at which the line was opened.
     opened: Duration,
     deadline: Duration,
     faults: WireFaults,
+    /// Faults to come, earliest first.
+    to_come: VecDeque<(Duration, WireFaults)>,
     rng: ChaCha8Rng,
     parser: Parser,
     dispatcher: Dispatcher,
@@ -39,13 +43,15 @@ pub(crate) struct Line {
 }
 
 impl Line {
-    pub(crate) fn new(bench: Bench, settings: &WireSettings) -> Self {
+    /// A line between a host and the devices of a bench, whose time goes on from where it is.
+    pub fn new(bench: Bench, settings: &WireSettings) -> Self {
         Self {
             opened: bench.now(),
             free: bench.now(),
             bench,
             deadline: settings.deadline,
             faults: settings.faults.clone(),
+            to_come: VecDeque::new(),
             rng: ChaCha8Rng::seed_from_u64(settings.seed),
             parser: Parser::default(),
             dispatcher: Dispatcher::default(),
@@ -54,18 +60,33 @@ impl Line {
     }
 
     /// The bench, its time being now.
-    pub(crate) fn bench(&mut self, host: Duration) -> &mut Bench {
+    pub fn bench(&mut self, host: Duration) -> &mut Bench {
         if self.bench.clock() == Clock::Real {
             self.advance_to(self.opened + host);
         }
         &mut self.bench
     }
 
-    pub(crate) fn faults(&mut self) -> &mut WireFaults {
+    /// Has the faults change at a time of the bench.
+    pub fn schedule(&mut self, at: Duration, faults: WireFaults) {
+        let place = self.to_come.partition_point(|&(earlier, _)| earlier <= at);
+        self.to_come.insert(place, (at, faults));
+    }
+
+    /// How long the port takes nothing, if it is busy with what is about to come.
+    pub(crate) fn busy(&mut self) -> Option<Duration> {
+        self.rng
+            .random_bool(self.faults.busy)
+            .then_some(self.faults.late_by)
+    }
+
+    /// What goes wrong on it, to be changed.
+    pub fn faults(&mut self) -> &mut WireFaults {
         &mut self.faults
     }
 
-    pub(crate) fn counters(&self) -> Counters {
+    /// What passed over it so far.
+    pub fn counters(&self) -> Counters {
         Counters {
             damaged: self.parser.damaged(),
             ..self.counters
@@ -73,13 +94,16 @@ impl Line {
     }
 
     /// Takes bytes that the host sent at `baud`, and gives what it will hear.
-    pub(crate) fn receive(&mut self, bytes: &[u8], baud: u32, host: Duration) -> Vec<Outgoing> {
+    pub fn receive(&mut self, bytes: &[u8], baud: u32, host: Duration) -> Vec<Outgoing> {
         let begin = match self.bench.clock() {
             Clock::Real => (self.opened + host).max(self.free),
             Clock::Wire => self.bench.now().max(self.free),
         };
         let end = begin + wire_time(bytes.len(), baud);
         self.free = end;
+        while let Some((_, faults)) = self.to_come.pop_front_if(|(at, _)| *at <= begin) {
+            self.faults = faults;
+        }
         self.counters.bytes_in += bytes.len() as u64;
         let mut outgoing = Vec::new();
         if self.faults.echo {
@@ -88,7 +112,17 @@ impl Line {
                 bytes: bytes.to_vec(),
             });
         }
-        self.parser.push(bytes);
+        match self.faults.take(bytes, &mut self.rng) {
+            Some(arrived) if arrived == bytes => self.parser.push(bytes),
+            hurt => {
+                self.parser.push(&hurt.unwrap_or_default());
+                self.counters.requests_hurt += 1;
+                // Whoever waits for an answer waits in vain.
+                if self.bench.clock() == Clock::Wire {
+                    self.free += self.deadline;
+                }
+            }
+        }
         while let Some(received) = self.parser.take() {
             let arrival = end.saturating_sub(wire_time(received.bytes_after, baud));
             self.advance_to(arrival);
@@ -123,7 +157,7 @@ impl Line {
                 Slot::Status { delay, bytes } => {
                     self.free += delay + wire_time(bytes.len(), baud);
                     let sent = self.send(&bytes, lost, host);
-                    in_vain |= sent.as_ref().is_none_or(|sent| sent.bytes != bytes);
+                    in_vain |= !matches!(&sent[..], [whole] if whole.bytes == bytes);
                     outgoing.extend(sent);
                 }
             }
@@ -133,18 +167,23 @@ impl Line {
         }
     }
 
-    /// Sends one status packet, which leaves the line when that is free again; `None` where it is lost.
-    fn send(&mut self, bytes: &[u8], lost: bool, host: Duration) -> Option<Outgoing> {
-        let Some(delivery) = self.faults.deliver(bytes, &mut self.rng).filter(|_| !lost) else {
+    /// Sends one status packet, which leaves the line when that is free again; nothing where it is lost.
+    fn send(&mut self, bytes: &[u8], lost: bool, host: Duration) -> Vec<Outgoing> {
+        let parts = self.faults.deliver(bytes, &mut self.rng);
+        if lost || parts.is_empty() {
             self.counters.dropped += 1;
-            return None;
-        };
+            return Vec::new();
+        }
         self.counters.replies += 1;
-        self.counters.hurt += u64::from(delivery.bytes != bytes || !delivery.late.is_zero());
-        Some(Outgoing {
-            due: self.due(self.free, delivery.late, host),
-            bytes: delivery.bytes,
-        })
+        let hurt = parts
+            .iter()
+            .any(|part| part.bytes != bytes || !part.late.is_zero());
+        self.counters.hurt += u64::from(hurt);
+        let outgoing = parts.into_iter().map(|part| Outgoing {
+            due: self.due(self.free, part.late, host),
+            bytes: part.bytes,
+        });
+        outgoing.collect()
     }
 
     /// Host time at which what leaves the line at `time` reaches the host. In wire time that is at once, but for what

@@ -22,5 +22,6 @@ mod terminal;
 
 pub use counters::Counters;
 pub use faults::WireFaults;
+pub use line::{Line, Outgoing};
 pub use server::Server;
 pub use settings::WireSettings;

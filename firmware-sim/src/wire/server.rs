@@ -1,6 +1,6 @@
 use std::collections::VecDeque;
 use std::io::{self, PipeReader, PipeWriter};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -23,11 +23,10 @@ const HOUSEKEEPING: Duration = Duration::from_millis(100);
 /// Dropping it hangs up: a client gets an I/O error, as from an adapter that was unplugged.
 pub struct Server {
     shared: Arc<Shared>,
-    path: std::path::PathBuf,
-    link: Option<Link>,
-    /// Its end tells the thread to stop.
-    stop: Option<PipeWriter>,
-    thread: Option<JoinHandle<()>>,
+    path: PathBuf,
+    /// The stable name that was asked for, and the link while it is there.
+    link: Option<(PathBuf, Option<Link>)>,
+    cable: Option<Cable>,
 }
 
 struct Shared {
@@ -39,6 +38,23 @@ impl Shared {
     /// A test that panics while it holds the line does not take the simulator down.
     fn line(&self) -> MutexGuard<'_, Line> {
         self.line.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The thread that serves one terminal; dropping this ends both.
+struct Cable {
+    /// Its end tells the thread to stop.
+    stop: Option<PipeWriter>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Drop for Cable {
+    fn drop(&mut self) {
+        drop(self.stop.take());
+        if let Some(thread) = self.thread.take() {
+            // Its panic was reported by the panic hook; there is nothing left to do for it here.
+            let _ = thread.join();
+        }
     }
 }
 
@@ -55,17 +71,44 @@ impl Server {
     ///
     /// # Errors
     /// [`SimError::Terminal`].
-    pub fn with_bench(mut bench: Bench, settings: &WireSettings) -> Result<Self, SimError> {
-        let failed = |attempt| move |source| SimError::Terminal { attempt, source };
-        let baud = bench.devices().first().map_or(57_600, |device| device.baud());
-        let terminal = Terminal::open(baud).map_err(failed("open a pseudo-terminal"))?;
-        let path = terminal.path().to_owned();
-        let (stopped, stop) = io::pipe().map_err(failed("make a pipe"))?;
-        let shared = Arc::new(Shared {
+    pub fn with_bench(bench: Bench, settings: &WireSettings) -> Result<Self, SimError> {
+        let shared = Shared {
             line: Mutex::new(Line::new(bench, settings)),
             opened: Instant::now(),
-        });
-        let served = Arc::clone(&shared);
+        };
+        let mut server = Self {
+            shared: Arc::new(shared),
+            path: PathBuf::new(),
+            link: None,
+            cable: None,
+        };
+        server.plug_in()?;
+        Ok(server)
+    }
+
+    /// Pulls the adapter's plug: a client gets an I/O error. The bench goes on.
+    pub fn unplug(&mut self) {
+        self.cable = None;
+        if let Some((_, link)) = &mut self.link {
+            *link = None;
+        }
+    }
+
+    /// Puts the plug in again, which may give the terminal another name; the stable one leads to it. Does nothing where
+    /// it is in.
+    ///
+    /// # Errors
+    /// [`SimError::Terminal`], [`SimError::Link`].
+    pub fn plug_in(&mut self) -> Result<(), SimError> {
+        if self.cable.is_some() {
+            return Ok(());
+        }
+        let failed = |attempt| move |source| SimError::Terminal { attempt, source };
+        let baud = self.bench(|bench| bench.devices()[0].baud());
+        let terminal = Terminal::open(baud).map_err(failed("open a pseudo-terminal"))?;
+        self.path = terminal.path().to_owned();
+        let (stopped, stop) = io::pipe().map_err(failed("make a pipe"))?;
+        let served = Arc::clone(&self.shared);
         let thread = std::thread::Builder::new()
             .name("firmware-sim".to_owned())
             .spawn(move || {
@@ -74,13 +117,14 @@ impl Server {
                 }
             })
             .map_err(failed("start a thread"))?;
-        Ok(Self {
-            shared,
-            path,
-            link: None,
+        self.cable = Some(Cable {
             stop: Some(stop),
             thread: Some(thread),
-        })
+        });
+        if let Some((path, link)) = &mut self.link {
+            *link = Some(Link::make(path, &self.path)?);
+        }
+        Ok(())
     }
 
     /// Gives the terminal a stable name as well: a symbolic link, replaced where a killed simulator left one, and
@@ -89,11 +133,11 @@ impl Server {
     /// # Errors
     /// [`SimError::Link`].
     pub fn link(&mut self, path: &Path) -> Result<(), SimError> {
-        self.link = Some(Link::make(path, &self.path)?);
+        self.link = Some((path.to_owned(), Some(Link::make(path, &self.path)?)));
         Ok(())
     }
 
-    /// What a client opens.
+    /// What a client opens: the terminal of now, or the last one while the plug is out.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -109,19 +153,14 @@ impl Server {
         change(self.shared.line().faults());
     }
 
+    /// Has what goes wrong on the wire change at a time of the bench.
+    pub fn schedule(&self, at: Duration, faults: WireFaults) {
+        self.shared.line().schedule(at, faults);
+    }
+
     /// What passed over the wire so far.
     pub fn counters(&self) -> Counters {
         self.shared.line().counters()
-    }
-}
-
-impl Drop for Server {
-    fn drop(&mut self) {
-        drop(self.stop.take());
-        if let Some(thread) = self.thread.take() {
-            // Its panic was reported by the panic hook; there is nothing left to do for it here.
-            let _ = thread.join();
-        }
     }
 }
 
@@ -132,6 +171,8 @@ fn serve(terminal: &Terminal, shared: &Shared, stopped: &PipeReader) -> io::Resu
     let _ = rustix::thread::set_current_timer_slack(std::num::NonZeroU64::new(1));
     let mut due: VecDeque<Outgoing> = VecDeque::new();
     let mut buffer = [0; 4096];
+    // Until when a busy port takes nothing of what has come.
+    let mut busy: Option<Duration> = None;
     loop {
         let now = shared.opened.elapsed();
         while due.front().is_some_and(|first| first.due <= now) {
@@ -143,9 +184,16 @@ fn serve(terminal: &Terminal, shared: &Shared, stopped: &PipeReader) -> io::Resu
             .front()
             .map_or(HOUSEKEEPING, |first| first.due.saturating_sub(now))
             .min(HOUSEKEEPING);
-        match await_bytes(terminal, stopped, wait)? {
+        let deaf = busy.map_or(Duration::ZERO, |until| until.saturating_sub(now));
+        match await_bytes(terminal, stopped, wait, deaf)? {
             Wake::Stop => return Ok(()),
             Wake::Bytes => {
+                if busy.take().is_none()
+                    && let Some(pause) = shared.line().busy()
+                {
+                    busy = Some(now + pause);
+                    continue;
+                }
                 let read = terminal.read(&mut buffer)?;
                 let heard = shared
                     .line()
@@ -167,12 +215,19 @@ enum Wake {
     Nothing,
 }
 
-fn await_bytes(terminal: &Terminal, stopped: &PipeReader, wait: Duration) -> io::Result<Wake> {
+/// Waits for bytes for so long at most; for so long as it is `deaf` for the end alone.
+fn await_bytes(
+    terminal: &Terminal,
+    stopped: &PipeReader,
+    wait: Duration,
+    deaf: Duration,
+) -> io::Result<Wake> {
+    let (wait, heeded) = match deaf.is_zero() {
+        true => (wait, PollFlags::IN),
+        false => (wait.min(deaf), PollFlags::empty()),
+    };
     let wait = Timespec::try_from(wait).map_err(io::Error::other)?;
-    let mut sources = [
-        PollFd::new(terminal, PollFlags::IN),
-        PollFd::new(stopped, PollFlags::IN),
-    ];
+    let mut sources = [PollFd::new(terminal, heeded), PollFd::new(stopped, PollFlags::IN)];
     match poll(&mut sources, Some(&wait)) {
         Err(Errno::INTR) => Ok(Wake::Nothing),
         Err(error) => Err(error.into()),

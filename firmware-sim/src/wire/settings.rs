@@ -48,11 +48,16 @@ struct RawWire {
     drop_reply: f64,
     duplicate_reply: f64,
     truncate_reply: f64,
+    behead_reply: f64,
+    split_reply: f64,
     noise: f64,
     wrong_length: f64,
     wrong_id: f64,
     late_reply: f64,
     late_ms: f64,
+    corrupt_request: f64,
+    drop_request: f64,
+    busy: f64,
     echo: bool,
     silent: Vec<RawSilence>,
 }
@@ -72,11 +77,16 @@ impl Default for RawWire {
             drop_reply: 0.0,
             duplicate_reply: 0.0,
             truncate_reply: 0.0,
+            behead_reply: 0.0,
+            split_reply: 0.0,
             noise: 0.0,
             wrong_length: 0.0,
             wrong_id: 0.0,
             late_reply: 0.0,
             late_ms: 50.0,
+            corrupt_request: 0.0,
+            drop_request: 0.0,
+            busy: 0.0,
             echo: false,
             silent: Vec::new(),
         }
@@ -96,6 +106,11 @@ impl RawWire {
             drop_reply: rate("wire.drop_reply", self.drop_reply)?,
             duplicate_reply: rate("wire.duplicate_reply", self.duplicate_reply)?,
             truncate_reply: rate("wire.truncate_reply", self.truncate_reply)?,
+            behead_reply: rate("wire.behead_reply", self.behead_reply)?,
+            split_reply: rate("wire.split_reply", self.split_reply)?,
+            corrupt_request: rate("wire.corrupt_request", self.corrupt_request)?,
+            drop_request: rate("wire.drop_request", self.drop_request)?,
+            busy: rate("wire.busy", self.busy)?,
             noise: rate("wire.noise", self.noise)?,
             wrong_length: rate("wire.wrong_length", self.wrong_length)?,
             wrong_id: rate("wire.wrong_id", self.wrong_id)?,
@@ -156,6 +171,7 @@ mod tests {
         let faults = parse(
             "corrupt_byte = 0.002\ndrop_reply = 0.005\nduplicate_reply = 0.1\ntruncate_reply = 0.2\n\
              noise = 0.3\nwrong_length = 0.4\nwrong_id = 0.5\nlate_reply = 0.6\nlate_ms = 70\necho = true\n\
+             behead_reply = 0.7\nsplit_reply = 0.8\ncorrupt_request = 0.01\ndrop_request = 0.02\nbusy = 0.03\n\
              silent = [{ id = 2, from_s = 1.5 }]",
         )
         .unwrap()
@@ -165,6 +181,11 @@ mod tests {
             drop_reply: 0.005,
             duplicate_reply: 0.1,
             truncate_reply: 0.2,
+            behead_reply: 0.7,
+            split_reply: 0.8,
+            corrupt_request: 0.01,
+            drop_request: 0.02,
+            busy: 0.03,
             noise: 0.3,
             wrong_length: 0.4,
             wrong_id: 0.5,
