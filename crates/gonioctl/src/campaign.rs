@@ -15,7 +15,12 @@ const SEEDS: u64 = 1_000_000_000;
 ///
 /// # Errors
 /// Stdout refuses.
-pub(crate) fn campaign(captures: u64, seed: Option<u64>, as_json: bool) -> anyhow::Result<ExitCode> {
+pub(crate) fn campaign(
+    captures: u64,
+    seed: Option<u64>,
+    over_wire: bool,
+    as_json: bool,
+) -> anyhow::Result<ExitCode> {
     let fresh = || {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         since.as_micros() as u64 % SEEDS
@@ -24,7 +29,12 @@ pub(crate) fn campaign(captures: u64, seed: Option<u64>, as_json: bool) -> anyho
     print::say(format_args!("{captures} captures, seed {seed}"));
     let begun = Instant::now();
     let told = AtomicU64::new(0);
-    let campaigned = Campaign { captures, seed }.run(&|done, of| {
+    let campaigned = Campaign {
+        captures,
+        seed,
+        over_wire,
+    }
+    .run(&|done, of| {
         let tenth = 10 * done / of.max(1);
         if told.fetch_max(tenth, Ordering::Relaxed) < tenth {
             print::say(format_args!("{done} of {of}"));

@@ -223,8 +223,11 @@ pub(crate) enum Command {
         /// Seed of the first one; the others follow. A fresh one unless given.
         #[arg(long, value_name = "S", value_parser = clap::value_parser!(u64).range(..1 << 62))]
         seed: Option<u64>,
+        /// Over pseudo-terminals, whose wires fail too.
+        #[arg(long)]
+        wire: bool,
         /// Do one script again.
-        #[arg(long, value_name = "FILE", conflicts_with_all = ["captures", "seed"])]
+        #[arg(long, value_name = "FILE", conflicts_with_all = ["captures", "seed", "wire"])]
         replay: Option<PathBuf>,
         #[command(flatten)]
         output: Output,

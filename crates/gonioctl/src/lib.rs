@@ -121,11 +121,12 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
         Command::Campaign {
             captures,
             seed,
+            wire,
             replay,
             output,
         } => match replay {
             Some(script) => return campaign::replay(&script, output.json),
-            None => return campaign::campaign(captures, seed, output.json),
+            None => return campaign::campaign(captures, seed, wire, output.json),
         },
         Command::Completions { shell } => manual::completions(shell)?,
         Command::Man { directory } => manual::man(&directory)?,

@@ -9,8 +9,12 @@ mod carry;
 mod in_process;
 mod script;
 mod truth;
+mod wire;
 
-pub use script::Script;
+pub use script::{Script, WireFault};
+
+/// Captures over wires for each processor: they do little but wait for replies.
+const WAITING: usize = 4;
 
 /// Many captures on the simulated rig, each with a few random faults, from one seed.
 ///
@@ -22,6 +26,8 @@ pub struct Campaign {
     pub captures: u64,
     /// The first one's seed; the others follow.
     pub seed: u64,
+    /// Whether they go over pseudo-terminals, where wires fail too, or stay in this process, where devices do.
+    pub over_wire: bool,
 }
 
 /// What a campaign came to.
@@ -58,14 +64,15 @@ pub struct Carried {
 }
 
 impl Campaign {
-    /// Carries all captures out on as many threads as there are processors.
+    /// Carries all captures out on all processors.
     ///
     /// # Panics
     /// Never for what a capture does; where a thread cannot be started.
     pub fn run(&self, progress: &Progress<'_>) -> Campaigned {
         let (next, finished) = (AtomicU64::new(0), AtomicU64::new(0));
         let all = Mutex::new(Campaigned::default());
-        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        let threads = processors * if self.over_wire { WAITING } else { 1 };
         std::thread::scope(|scope| {
             for _ in 0..threads {
                 scope.spawn(|| {
@@ -74,7 +81,11 @@ impl Campaign {
                         if i >= self.captures {
                             break;
                         }
-                        let script = Script::random(self.seed.wrapping_add(i));
+                        let seed = self.seed.wrapping_add(i);
+                        let script = match self.over_wire {
+                            true => Script::random_over_wire(seed),
+                            false => Script::random(seed),
+                        };
                         let carried = script.carry().map_err(|why| script.shrink(why));
                         all.lock()
                             .expect("no thread panics while it holds this")

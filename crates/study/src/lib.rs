@@ -21,7 +21,7 @@ mod statistics;
 mod study;
 mod write;
 
-pub use campaign::{Campaign, Campaigned, Carried, Script, Wrong};
+pub use campaign::{Campaign, Campaigned, Carried, Script, WireFault, Wrong};
 pub use error::Error;
 pub use grid::{Grid, GridPlan, GridRow, Source};
 pub use judge::Score;

@@ -9,6 +9,7 @@ use tokio::sync::watch;
 
 use super::in_process::InProcess;
 use super::truth::whole;
+use super::wire::OverWire;
 use super::{Carried, Script};
 
 /// A job of all kinds of steps, in seconds of rig time.
@@ -17,22 +18,24 @@ const JOB: &str = "[[plane]]\ntheta_r_deg = 60\nreadings = 8\n[arc]\nreadings = 
 const SPECIMEN: &str = "blue-rubber";
 /// Executions after which a run must be complete: each fault ends one at most, and a third of them is to spare.
 const MAX_EXECUTIONS: u64 = 8;
-/// Time in which one execution must end, come what may.
-const HANG: Duration = Duration::from_secs(3600);
-/// After this every silence, stall, watchdog and boot is over.
-pub(super) const REST: Duration = Duration::from_secs(12);
 /// The devices.
 pub(super) const DEVICES: [Device; 3] = [Device::Light, Device::Sensor, Device::Photometer];
 
 /// A simulated rig that captures are carried out on, with a view behind it.
-pub(super) trait Bench: Sized {
+pub(super) trait Bench: Send + Sized {
     /// What drives it.
     type Rig: Rig;
+
+    /// Time in which one execution must end, come what may.
+    const HANG: Duration;
 
     /// The rig of a script, its faults lying in wait.
     fn new(script: &Script, file: &RigFile) -> Result<(Self, Self::Rig), String>;
 
-    /// Lets [`REST`] pass while nobody speaks to the rig.
+    /// Looks whether something is to be done to it now; called at everything that happens in a capture.
+    fn look(&mut self) {}
+
+    /// Lets time pass in which watchdogs trip and boots end, while nobody speaks to the rig.
     async fn rest(&self);
 
     /// A register, past the bus.
@@ -44,13 +47,15 @@ pub(super) trait Bench: Sized {
 
 /// Carries a script's capture out.
 pub(super) fn carry(script: &Script) -> Result<Carried, String> {
+    // Over a quiet terminal a paused clock would jump to the next deadline.
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_time()
-        .start_paused(true)
+        .start_paused(!script.over_wire)
         .build()
         .map_err(words)?;
-    let carried = catch_unwind(AssertUnwindSafe(|| {
-        runtime.block_on(carry_out::<InProcess>(script))
+    let carried = catch_unwind(AssertUnwindSafe(|| match script.over_wire {
+        true => runtime.block_on(carry_out::<OverWire>(script)),
+        false => runtime.block_on(carry_out::<InProcess>(script)),
     }));
     carried.unwrap_or_else(|panic| {
         let text = panic.downcast_ref::<String>().cloned();
@@ -63,8 +68,9 @@ async fn carry_out<B: Bench>(script: &Script) -> Result<Carried, String> {
     let text = rig_file(script);
     let file = RigFile::parse(&text, "campaign".as_ref()).map_err(words)?;
     let specimen = brdf::specimen(SPECIMEN).map_err(words)?;
-    let (mut bench, mut rig) = B::new(script, &file)?;
-    let start = rig.snapshot().await.map_err(words)?.pose();
+    let (mut bench, rig) = B::new(script, &file)?;
+    let mut drive = Drive::new(rig, file.clone());
+    let start = drive.snapshot().await.map_err(words)?.pose();
     let job = Job::parse(JOB, "campaign").map_err(words)?;
     let plan = sweep::plan(&job, &capture::mechanics(&file, Some(start))).map_err(words)?;
     let steps = plan.steps.len();
@@ -77,13 +83,12 @@ async fn carry_out<B: Bench>(script: &Script) -> Result<Carried, String> {
         started: String::new(),
         certificate: None,
     })]);
-    let mut drive = Drive::new(rig, file.clone());
     let (_operator, control) = watch::channel(Command::Run);
     let mut last = String::new();
     for execution in 1..=MAX_EXECUTIONS {
-        let mut unseen = |_| ();
-        let run = capture::run(&mut drive, &mut journal, control.clone(), &mut unseen);
-        let outcome = tokio::time::timeout(HANG, run)
+        let mut look = |_| bench.look();
+        let run = capture::run(&mut drive, &mut journal, control.clone(), &mut look);
+        let outcome = tokio::time::timeout(B::HANG, run)
             .await
             .map_err(|_| format!("execution {execution} hangs"))?
             .map_err(words)?;

@@ -1,15 +1,22 @@
+use std::time::Duration;
+
 use firmware_sim::in_process::{InProcessRig, SharedBench};
 use rig::dynamixel::register::Register;
 use rig::{Device, Drive, RigFile};
 
 use super::Script;
-use super::carry::{Bench, DEVICES, REST, words};
+use super::carry::{Bench, DEVICES, words};
+
+/// After this every silence, stall, watchdog and boot is over.
+const REST: Duration = Duration::from_secs(12);
 
 /// The rig in this process, over tokio's paused clock.
 pub(super) struct InProcess(SharedBench);
 
 impl Bench for InProcess {
     type Rig = InProcessRig;
+
+    const HANG: Duration = Duration::from_secs(3600);
 
     fn new(script: &Script, file: &RigFile) -> Result<(Self, InProcessRig), String> {
         let rig = InProcessRig::new(file).map_err(words)?;
