@@ -75,8 +75,12 @@ fn list(plan: &Plan) -> std::io::Result<()> {
         clock(plan.seconds())
     ))?;
     for left_out in &plan.left_out {
+        let saved = match left_out.seconds {
+            0.0 => String::new(),
+            seconds => format!(", {seconds:.1} s saved"),
+        };
         print::line(format_args!(
-            "left out: {} ({} readings): {}",
+            "left out: {} ({} readings{saved}): {}",
             left_out.what, left_out.readings, left_out.why
         ))?;
     }

@@ -287,6 +287,8 @@ pub struct LeftOutView {
     pub why: String,
     /// Readings that are not taken because of it.
     pub readings: usize,
+    /// Seconds that this saves, as planned.
+    pub seconds: f64,
 }
 
 impl From<&Plan> for PlanView {
@@ -303,6 +305,7 @@ impl From<&Plan> for PlanView {
             what: left.what.clone(),
             why: left.why.clone(),
             readings: left.readings,
+            seconds: left.seconds,
         });
         Self {
             readings: plan.steps.len(),

@@ -41,6 +41,9 @@ impl Curve {
     }
 }
 
+/// A curve's θ_d at some half angle, and its index.
+type Neighbour = Option<(f64, usize)>;
+
 /// ln(1 + θ_h/knee).
 #[inline]
 fn warped(theta_h: f64) -> f64 {
@@ -75,8 +78,32 @@ impl Lobe {
     #[inline]
     pub(crate) fn log(&self, theta_h: f64, theta_d: f64, without: Option<usize>) -> DVec3 {
         let x = warped(theta_h);
-        let mut below: Option<(f64, &Curve)> = None;
-        let mut above: Option<(f64, &Curve)> = None;
+        match self.neighbours(theta_h, theta_d, without) {
+            (Some((low, a)), Some((high, b))) => {
+                let [a, b] = [a, b].map(|n| self.curves[n].log.at(x));
+                a.lerp(b, (theta_d - low) / (high - low))
+            }
+            (Some((_, n)), None) | (None, Some((_, n))) => self.curves[n].log.at(x),
+            (None, None) => self
+                .nearest(theta_h, without)
+                .map_or(DVec3::ZERO, |n| self.curves[n].log.at(x)),
+        }
+    }
+
+    /// The curves of which ln G is made at some place: one or two.
+    pub(crate) fn beside(&self, theta_h: f64, theta_d: f64) -> impl Iterator<Item = usize> {
+        let (below, above) = self.neighbours(theta_h, theta_d, None);
+        let nearest = || self.nearest(theta_h, None);
+        let alone = below.is_none() && above.is_none();
+        let beside = below.into_iter().chain(above).map(|(_, n)| n);
+        beside.chain(alone.then(nearest).flatten())
+    }
+
+    /// Of the curves that cover a half angle the next ones below and above a difference angle, each with its own.
+    #[inline]
+    fn neighbours(&self, theta_h: f64, theta_d: f64, without: Option<usize>) -> (Neighbour, Neighbour) {
+        let mut below: Neighbour = None;
+        let mut above: Neighbour = None;
         for (n, curve) in self.curves.iter().enumerate() {
             if Some(n) == without || !curve.covers(theta_h) {
                 continue;
@@ -84,35 +111,21 @@ impl Lobe {
             let at = curve.theta_d(theta_h);
             if at <= theta_d {
                 if below.is_none_or(|(best, _)| at > best) {
-                    below = Some((at, curve));
+                    below = Some((at, n));
                 }
             } else if above.is_none_or(|(best, _)| at < best) {
-                above = Some((at, curve));
+                above = Some((at, n));
             }
         }
-        match (below, above) {
-            (Some((low, a)), Some((high, b))) => {
-                a.log.at(x).lerp(b.log.at(x), (theta_d - low) / (high - low))
-            }
-            (Some((_, curve)), None) | (None, Some((_, curve))) => curve.log.at(x),
-            (None, None) => self
-                .nearest(theta_h, without)
-                .map_or(DVec3::ZERO, |curve| curve.log.at(x)),
-        }
+        (below, above)
     }
 
     /// The curve that ends nearest to a half angle which none covers.
     #[cold]
-    fn nearest(&self, theta_h: f64, without: Option<usize>) -> Option<&Curve> {
-        let gap = |curve: &Curve| (curve.from - theta_h).max(theta_h - curve.to);
-        let others = self
-            .curves
-            .iter()
-            .enumerate()
-            .filter(|&(n, _)| Some(n) != without);
-        others
-            .map(|(_, curve)| curve)
-            .min_by(|a, b| gap(a).total_cmp(&gap(b)))
+    fn nearest(&self, theta_h: f64, without: Option<usize>) -> Option<usize> {
+        let gap = |n: usize| (self.curves[n].from - theta_h).max(theta_h - self.curves[n].to);
+        let others = (0..self.curves.len()).filter(|&n| Some(n) != without);
+        others.min_by(|&a, &b| gap(a).total_cmp(&gap(b)))
     }
 
     /// Whether any curve reaches this half angle.

@@ -34,6 +34,8 @@ pub enum Basis {
     Extrapolated,
     /// The arms hide each other there, so that nobody could have read it: near retro-reflection, and near the normal.
     Occluded,
+    /// It lies outside of what the job's scene asks for, so that nothing was read for it.
+    NotMeasured,
 }
 
 /// A factor as a table.

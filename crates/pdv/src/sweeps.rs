@@ -34,7 +34,7 @@ impl Point {
     }
 
     /// `None` where a number is not finite or no light can stand there.
-    fn new(o: &Observation) -> Option<Self> {
+    pub(crate) fn new(o: &Observation) -> Option<Self> {
         let alpha = light_angle(o.theta_r, o.deviation)?;
         let theta_h = 0.5 * (alpha + o.theta_r);
         let theta_d = 0.5 * (alpha - o.theta_r).abs();

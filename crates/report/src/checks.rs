@@ -183,11 +183,11 @@ pub(crate) fn energy(model: &dyn Brdf, azimuths: usize) -> Check {
     }
 }
 
-/// How much of the BRDF rests on nothing that was measured, over pairs below 80°, even in angle.
+/// How much of the BRDF rests on nothing that was measured, over pairs below 80°, even in angle, that the job asks for.
 pub(crate) fn coverage(model: &dyn Model) -> Check {
     let zenith = || (0..80).step_by(4).map(|deg| f64::from(deg + 2).to_radians());
     let azimuth = || (0..180).step_by(10).map(|deg| f64::from(deg + 5).to_radians());
-    let (mut pairs, mut beyond, mut hidden) = (0_u32, 0_u32, 0_u32);
+    let (mut pairs, mut beyond, mut hidden, mut outside) = (0_u32, 0_u32, 0_u32, 0_u32);
     for (theta_i, theta_o) in zenith().flat_map(|i| zenith().map(move |o| (i, o))) {
         let exitant = Spherical {
             theta: theta_o,
@@ -196,22 +196,34 @@ pub(crate) fn coverage(model: &dyn Model) -> Check {
         .direction();
         for phi in azimuth() {
             let incident = Spherical { theta: theta_i, phi }.direction();
-            pairs += 1;
             let basis = model.basis(incident, exitant);
+            if basis == Basis::NotMeasured {
+                outside += 1;
+                continue;
+            }
+            pairs += 1;
             beyond += u32::from(basis == Basis::Extrapolated);
             hidden += u32::from(basis == Basis::Occluded);
         }
     }
-    let [share, occluded] = [beyond, hidden].map(|count| f64::from(count) / f64::from(pairs));
+    let [share, occluded] = [beyond, hidden].map(|count| f64::from(count) / f64::from(pairs.max(1)));
+    let not_measured = f64::from(outside) / f64::from(pairs + outside);
+    let of_scene = match outside {
+        0 => String::new(),
+        _ => format!(
+            " The scene leaves {:.1} % out, which are not measured and not counted here.",
+            100.0 * not_measured
+        ),
+    };
     Check {
         name: "coverage",
         verdict: limit(share + occluded, COVERAGE_LIMIT),
         text: format!(
-            "{:.1} % of all pairs of directions below 80° lie beyond the range that was measured and are extrapolated, {:.1} % where the arms hide each other.",
+            "{:.1} % of all pairs of directions below 80° lie beyond the range that was measured and are extrapolated, {:.1} % where the arms hide each other.{of_scene}",
             100.0 * share,
             100.0 * occluded
         ),
-        values: json!({ "extrapolated": share, "occluded": occluded }),
+        values: json!({ "extrapolated": share, "occluded": occluded, "not_measured": not_measured }),
     }
 }
 

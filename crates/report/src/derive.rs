@@ -1,7 +1,7 @@
 use std::sync::Arc;
 
 use brdf::Brdf;
-use pdv::{Auto, Bivariate, Model, Observation, Planes, Separable};
+use pdv::{Auto, Bivariate, Model, Observation, Planes, Separable, Within};
 use rig::{Port, RigFile};
 use sweep::{Job, Sweep};
 
@@ -27,12 +27,16 @@ impl Sweeps {
         }
     }
 
-    /// The model that the job asks for.
+    /// The model that the job asks for, within its scene.
     ///
     /// # Errors
     /// Too few usable readings.
     pub(crate) fn model(&self, job: &Job) -> Result<Box<dyn Model>, pdv::Error> {
-        model(job.model, &self.planes, &self.arc)
+        let model = model(job.model, &self.planes, &self.arc)?;
+        Ok(match &job.scene {
+            Some(scene) => Box::new(Within::new(model, scene.clone())),
+            None => model,
+        })
     }
 }
 

@@ -7,8 +7,9 @@ use rand_distr::{Distribution, StandardNormal};
 use rig::RigFile;
 use sweep::{Job, Sweep};
 
+use crate::Measurement;
+use crate::derive::Sweeps;
 use crate::uncertainty::{COVERAGE, angles};
-use crate::{Measurement, model};
 
 /// Draws: the standard deviation over them is known to 13 %.
 const DRAWS: usize = 32;
@@ -48,9 +49,11 @@ impl MonteCarlo {
                 })
                 .collect()
             };
-            let planes: Vec<_> = (0..job.planes.len()).map(|i| sweep(Sweep::Plane(i))).collect();
-            let arc = sweep(Sweep::Arc);
-            model(job.model, &planes, &arc).ok()
+            let sweeps = Sweeps {
+                planes: (0..job.planes.len()).map(|i| sweep(Sweep::Plane(i))).collect(),
+                arc: sweep(Sweep::Arc),
+            };
+            sweeps.model(job).ok()
         };
         Self {
             models: (0..DRAWS).filter_map(draw).collect(),

@@ -147,9 +147,14 @@ fn error_table(columns: &[Metrics; 4]) -> Vec<Vec<String>> {
 }
 
 fn left_out_table(report: &Report) -> Vec<Vec<String>> {
-    let head = ["what", "readings", "why"].map(str::to_owned).to_vec();
+    let head = ["what", "readings", "seconds saved", "why"]
+        .map(str::to_owned)
+        .to_vec();
     let rows = report.left_out.iter();
     std::iter::once(head)
-        .chain(rows.map(|l| vec![l.what.clone(), l.readings.to_string(), l.why.clone()]))
+        .chain(rows.map(|l| {
+            let seconds = format!("{:.1}", l.seconds);
+            vec![l.what.clone(), l.readings.to_string(), seconds, l.why.clone()]
+        }))
         .collect()
 }

@@ -2,7 +2,8 @@ use std::io::{self, Write};
 
 use brdf::{Brdf, MerlTable};
 use capture::{FileJournal, Record};
-use pdv::{Comparison, Draw, Model, compare};
+use glam::{BVec3, DVec3};
+use pdv::{Comparison, Draw, Model, Scene, compare};
 use rig::RigFile;
 use serde::Serialize;
 use sweep::{Job, LeftOut};
@@ -77,7 +78,7 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
         .as_ref()
         .map(|_| MonteCarlo::new(&job, &measurements, records, &rig));
     if let (Some(model), Some(draws)) = (&model, &draws) {
-        write_model(directory, model.as_ref(), draws)?;
+        write_model(directory, &job, model.as_ref(), draws)?;
     }
     let errors = model.as_ref().zip(truth.as_ref()).map(|(model, truth)| {
         let estimate: &dyn Brdf = model.as_ref();
@@ -106,18 +107,42 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
 }
 
 /// factors.csv, brdf.binary and its uncertainty, slice.exr, preview.exr and preview.png.
-fn write_model(directory: &RunDirectory, model: &dyn Model, draws: &MonteCarlo) -> Result<(), ReportError> {
+fn write_model(
+    directory: &RunDirectory,
+    job: &Job,
+    model: &dyn Model,
+    draws: &MonteCarlo,
+) -> Result<(), ReportError> {
     directory.write("factors.csv", |file| write_factors(model, draws, file))?;
-    directory.write("brdf.binary", |file| MerlTable::fill(model).write_to(file))?;
-    directory.write("brdf.uncertainty.binary", |file| {
-        MerlTable::fill(draws).write_to(file)
-    })?;
+    let table = |of: &dyn Brdf| match &job.scene {
+        Some(scene) => MerlTable::fill(&Asked { of, model, scene }),
+        None => MerlTable::fill(of),
+    };
+    directory.write("brdf.binary", |file| table(model).write_to(file))?;
+    directory.write("brdf.uncertainty.binary", |file| table(draws).write_to(file))?;
     directory.write("slice.exr", |file| slice::write(model, file))?;
     let sphere = preview::sphere(model);
     directory.write("preview.exr", |file| sphere.write_exr(file, &preview::ATTRIBUTES))?;
     directory.write("preview.png", |file| {
         file.write_all(&sphere.png(preview::EXPOSURE)?)
     })
+}
+
+/// What a table holds of a scene: −1, as MERL marks what is not valid, outside of it and in channels that nobody asked for.
+struct Asked<'a> {
+    of: &'a dyn Brdf,
+    model: &'a dyn Model,
+    scene: &'a Scene,
+}
+
+impl Brdf for Asked<'_> {
+    fn eval(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
+        if !self.model.valid(incident, exitant) {
+            return DVec3::NEG_ONE;
+        }
+        let value = self.of.eval(incident, exitant);
+        DVec3::select(BVec3::from_array(self.scene.channels), value, DVec3::NEG_ONE)
+    }
 }
 
 /// One row a node: factor, its variable with the unit, the variable, red, green, blue, and their expanded

@@ -5,6 +5,10 @@ use toml::Spanned;
 
 use crate::{Arc, Distribution, Job, Model, Plane, SweepError};
 
+mod scene;
+
+use scene::RawScene;
+
 /// Most plane sweeps of one job: their order is found by trying every one.
 const MAX_PLANES: usize = 12;
 /// Degrees from the normal at which a plane's sensor may stand.
@@ -26,6 +30,7 @@ struct RawJob {
     arc: Option<RawArc>,
     #[serde(default)]
     reconstruction: RawReconstruction,
+    scene: Option<RawScene>,
 }
 
 #[derive(Deserialize)]
@@ -119,7 +124,8 @@ impl Source<'_> {
 impl Job {
     /// Reads the text of a job file; `name` is what messages call it.
     ///
-    /// Planes need θ_r of 0 … 85°, every sweep 1 … 2000 readings, an arc an offset of −1 … 1.
+    /// Planes need θ_r of 0 … 85°, every sweep 1 … 2000 readings, an arc an offset of −1 … 1, a scene ranges within
+    /// 0 … 90°.
     ///
     /// # Errors
     /// Names file, line, key and what is allowed: unknown or missing keys, wrong types, values out of range, no
@@ -161,6 +167,7 @@ impl Job {
             planes: planes.collect::<Result<_, _>>()?,
             arc: arc.transpose()?,
             model: raw.reconstruction.model,
+            scene: raw.scene.map(|scene| scene.check(&source)).transpose()?,
         })
     }
 }

@@ -1,4 +1,4 @@
-use pdv::Distribution;
+use pdv::{Distribution, Scene};
 use serde::{Deserialize, Serialize};
 
 /// What is to be measured, from a checked job file.
@@ -16,6 +16,8 @@ pub struct Job {
     pub arc: Option<Arc>,
     /// How the BRDF is made of the readings.
     pub model: Model,
+    /// What will be looked at; `None`: everything.
+    pub scene: Option<Scene>,
 }
 
 /// One plane sweep: the sensor stands at θ_r, the light crosses the plane.

@@ -13,11 +13,12 @@ mod planner;
 mod reach;
 mod route;
 mod targets;
+mod unread;
 
 pub use error::SweepError;
 pub use job::{Arc, Job, Model, Plane};
 pub use mechanics::Mechanics;
-pub use pdv::Distribution;
+pub use pdv::{Cell, Distribution, Scene};
 pub use plan::{LeftOut, Plan, Step, Sweep};
 pub use planner::{Visit, plan, visits};
 pub use route::way;

@@ -67,6 +67,9 @@ pub struct LeftOut {
     /// How many of the readings that the job asks for are not taken because of it; 0 where they went to the rest of
     /// the sweep.
     pub readings: usize,
+    /// Seconds that this saves, as planned; 0 where nothing of it could have been measured.
+    #[serde(default)]
+    pub seconds: f64,
 }
 
 /// The ordered list of readings that a job becomes, with its time and what was left out.

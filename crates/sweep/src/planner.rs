@@ -4,7 +4,7 @@ use crate::order::order;
 use crate::reach::Reach;
 use crate::route::{Standing, route};
 use crate::targets::{Targets, arc, plane};
-use crate::{Job, LeftOut, Mechanics, Plan, Step, Sweep, SweepError};
+use crate::{Job, LeftOut, Mechanics, Plan, Step, Sweep, SweepError, unread};
 
 /// Gain steps of the photometer.
 const GAINS: u8 = 3;
@@ -17,7 +17,8 @@ const DARK_REPEATS: usize = 4;
 /// First the dark readings, lamp off, where the arms stand: each gain at the shortest and the longest integration, so
 /// that offset and rate can be fitted. A long job repeats them every now and then, and ends with a last set; where
 /// visits to a reference pose follow the lamp, it begins and ends with one. Then the plane sweeps and the arc, in the order and direction with the least
-/// time of motion from where the arms stand. Angles are whole steps of the servos.
+/// time of motion from where the arms stand. Angles are whole steps of the servos. Of a job with a scene, readings that no
+/// value in it is made of are left out.
 ///
 /// # Errors
 /// The arms stand outside the envelope; a sweep of which nothing can be measured on this rig, with its key and why.
@@ -34,7 +35,27 @@ pub fn plan(job: &Job, mechanics: &Mechanics) -> Result<Plan, SweepError> {
         sweeps.push(arc(job, of, reach)?);
     }
     sweeps.retain(|sweep| !sweep.poses.is_empty());
-    let poses: Vec<Vec<Pose>> = sweeps.iter().map(|sweep| sweep.poses.clone()).collect();
+    let Some(scene) = &job.scene else {
+        return lay(job, mechanics, start, sweeps);
+    };
+    let whole = lay(job, mechanics, start, sweeps.clone())?;
+    unread::cut(job, scene, &mut sweeps, &whole);
+    let mut plan = lay(job, mechanics, start, sweeps)?;
+    plan.left_out.extend(unread::channels(scene));
+    Ok(plan)
+}
+
+/// Puts the poses of sweeps in the order of least motion, between what every run needs.
+fn lay(
+    job: &Job,
+    mechanics: &Mechanics,
+    start: Option<Standing>,
+    mut sweeps: Vec<Targets>,
+) -> Result<Plan, SweepError> {
+    let measured: Vec<usize> = (0..sweeps.len())
+        .filter(|&i| !sweeps[i].poses.is_empty())
+        .collect();
+    let poses: Vec<Vec<Pose>> = measured.iter().map(|&i| sweeps[i].poses.clone()).collect();
     let order = order(mechanics, start, &poses);
     let first = order.first().map(|&(i, backwards)| {
         let pose = poses[i][if backwards { poses[i].len() - 1 } else { 0 }];
@@ -57,7 +78,7 @@ pub fn plan(job: &Job, mechanics: &Mechanics) -> Result<Plan, SweepError> {
     for (i, backwards) in order {
         let poses = &poses[i];
         let along = (0..poses.len()).map(|j| poses[if backwards { poses.len() - 1 - j } else { j }]);
-        draft.sweep(&job.name, &mut sweeps[i], along)?;
+        draft.sweep(&job.name, &mut sweeps[measured[i]], along)?;
     }
     if draft.dark_sets > 1 {
         draft.dark();
@@ -245,6 +266,7 @@ impl<'a> Draft<'a> {
                 what: format!("{}, {unreached} poses", targets.sweep),
                 why: "no safe way leads there from the pose before".to_owned(),
                 readings: unreached,
+                seconds: 0.0,
             });
         }
         Ok(())

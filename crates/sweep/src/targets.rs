@@ -57,6 +57,7 @@ impl Stretches {
                 what: format!("{sweep}, {arm} {first:.1}° … {last:.1}°"),
                 why: reach.why(hindrance.as_ref()?),
                 readings: 0,
+                seconds: 0.0,
             })
         };
         self.stretches.iter().filter_map(describe).collect()
@@ -113,6 +114,7 @@ pub(crate) fn plane(job: &Job, index: usize, reach: Reach<'_>) -> Result<Targets
             what: format!("{name}, {} values of d_p", plane.readings - poses.len()),
             why: "closer than one servo count to their neighbours".to_owned(),
             readings: plane.readings - poses.len(),
+            seconds: 0.0,
         });
     }
     Ok(Targets {
@@ -169,6 +171,7 @@ pub(crate) fn arc(job: &Job, arc: &Arc, reach: Reach<'_>) -> Result<Targets, Swe
             what: format!("arc, {} values of θ_r", arc.readings - poses.len()),
             why: "closer than one servo count to their neighbours".to_owned(),
             readings: arc.readings - poses.len(),
+            seconds: 0.0,
         });
     }
     Ok(Targets {

@@ -81,6 +81,22 @@ fn bad_input_is_named_with_line_key_and_range() {
             format!("{plane}[reconstruction]\nmodel = \"magic\""),
             "job.toml, line 5: model: unknown variant `magic`, expected one of `separable`, `reciprocal`, `planes`, `bivariate`, `auto`",
         ),
+        (
+            format!("{plane}[scene]\ntheta_i_deg = [60, 0]"),
+            "job.toml, line 5: scene.theta_i_deg: [60, 0] is no range within 0 … 90, the smaller first",
+        ),
+        (
+            format!("{plane}[scene]\ntheta_o_deg = [0, nan]"),
+            "job.toml, line 5: scene.theta_o_deg: [0, NaN] is no range within 0 … 90, the smaller first",
+        ),
+        (
+            format!("{plane}[scene]\nchannels = []"),
+            "job.toml, line 5: scene.channels: empty, allowed are \"r\", \"g\", \"b\", at least one",
+        ),
+        (
+            format!("{plane}[scene]\nchannels = [\"x\"]"),
+            "job.toml, line 5: channels: unknown variant `x`, expected one of `r`, `g`, `b`",
+        ),
     ];
     for (text, expected) in table {
         let error = Job::parse(&text, "job.toml").unwrap_err();

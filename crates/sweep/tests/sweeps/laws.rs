@@ -58,6 +58,7 @@ prop_compose! {
             planes,
             arc: arc.map(|(readings, offset)| Arc { readings, offset: if mirror { 0.0 } else { offset } }),
             model: Model::Separable,
+            scene: None,
         }
     }
 }

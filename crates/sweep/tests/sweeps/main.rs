@@ -3,6 +3,7 @@
 mod jobs;
 mod laws;
 mod plans;
+mod scenes;
 
 use std::f64::consts::TAU;
 
