@@ -56,12 +56,21 @@ impl Planes {
         })
     }
 
+    /// [`Planes::exact`] of other readings of the same specimen, with this model's shape.
+    ///
+    /// # Errors
+    /// As [`Planes::from_observations`].
+    pub(crate) fn surface_of(
+        &self,
+        planes: &[Vec<Observation>],
+        arc: &[Observation],
+    ) -> Result<Surface, Error> {
+        Surface::new(&Sweeps::new(planes, arc)?, self.shape())
+    }
+
     /// Reflectance as [`Brdf::eval`] gives it, but by the formula and in f64, not from the table.
     pub fn exact(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
-        if !(incident.z > 0.0 && exitant.z > 0.0) {
-            return DVec3::ZERO;
-        }
-        self.surface.reflectance(&Pair::new(incident, exitant))
+        self.surface.eval(incident, exitant)
     }
 
     /// What the table loses: mean |ln(1 + f̂ c) − ln(1 + f c)| over pairs in the plane, c = √(cos θ_i cos θ_o), that

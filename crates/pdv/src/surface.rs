@@ -1,3 +1,4 @@
+use brdf::Brdf;
 use glam::DVec3;
 
 use crate::bisected::{Bisected, Pair, RISE};
@@ -132,5 +133,14 @@ impl Surface {
                 .collect(),
         };
         std::iter::once(f).chain(self.lobe.rows().map(side)).collect()
+    }
+}
+
+impl Brdf for Surface {
+    fn eval(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
+        if !(incident.z > 0.0 && exitant.z > 0.0) {
+            return DVec3::ZERO;
+        }
+        self.reflectance(&Pair::new(incident, exitant))
     }
 }
