@@ -6,7 +6,7 @@ use std::time::Duration;
 use brdf::{Brdf, Fitted, MerlTable, Spherical};
 use criterion::{BenchmarkGroup, Criterion, measurement::WallTime};
 use glam::DVec3;
-use pdv::{Distribution, Observation, Planes, Sampler, Separable, spread};
+use pdv::{Bivariate, Distribution, Observation, Planes, Sampler, Separable, spread};
 
 fn model() -> Separable {
     let theta_r = 70.0_f64.to_radians();
@@ -19,8 +19,8 @@ fn model() -> Separable {
     Separable::sample(&gold, theta_r, &deviations, &arc, 0.0).expect("poses exist")
 }
 
-/// The model of three planes and an arc.
-fn planes() -> Planes {
+/// Three planes and an arc.
+fn sweeps() -> (Vec<Vec<Observation>>, Vec<Observation>) {
     let gold = Fitted::named("gold-paint").expect("a fitted material");
     let plane = |deg: f64| {
         let theta_r = deg.to_radians();
@@ -30,7 +30,7 @@ fn planes() -> Planes {
         spread.deviations.iter().filter_map(read).collect()
     };
     let arc = (0..30).filter_map(|n| Observation::of(&gold, f64::from(n) * 0.05, 0.0));
-    Planes::from_observations(&[20.0, 45.0, 70.0].map(plane), &arc.collect::<Vec<_>>()).expect("poses exist")
+    ([20.0, 45.0, 70.0].map(plane).into(), arc.collect())
 }
 
 /// Pairs of directions, evenly in angle by a golden-ratio sequence.
@@ -92,7 +92,15 @@ fn main() {
             black_box(model.eval(*incident, *exitant));
         }
     });
-    let planes = planes();
+    let (sides, arc) = sweeps();
+    let bivariate = Bivariate::from_observations(&sides, &arc).expect("poses exist");
+    let table = seconds(&mut group, "bivariate table, 1024 pairs", || {
+        for pair in &pairs {
+            let (incident, exitant) = black_box(pair);
+            black_box(bivariate.eval(*incident, *exitant));
+        }
+    });
+    let planes = Planes::from_observations(&sides, &arc).expect("poses exist");
     let reciprocal = seconds(&mut group, "model of planes, 1024 pairs", || {
         for pair in &pairs {
             let (incident, exitant) = black_box(pair);
@@ -136,6 +144,7 @@ fn main() {
         ("three exp_m1", exponentials),
         ("separable", evaluation),
         ("planes (at most 60)", reciprocal),
+        ("bivariate (at most 60)", table),
         ("importance sample (at most 150)", sampling),
         ("MERL lookup", lookup),
     ] {

@@ -20,9 +20,9 @@ const PRODUCT: Shape = Shape {
 
 /// The bivariate baseline: f is taken to depend on half and difference angle alone (Romeiro, Vasilyev, Zickler 2008).
 ///
-/// A table of ln f at 90 × 90 nodes, even in √θ_h and in θ_d, from the readings in the plane: along a side they are
-/// interpolated over θ_h, between the sides and the arc over θ_d. Beyond the largest half angle, and where θ_h + θ_d
-/// passes the horizon, it is held.
+/// A table of ln f at 90 × 90 nodes, even in √tan(θ_h/2) and in tan(θ_d/2), which are nearly as even as √θ_h and θ_d and
+/// need no arctangent, from the readings in the plane: along a side they are interpolated over θ_h, between the sides
+/// and the arc over θ_d. Beyond the largest half angle, and where θ_h + θ_d passes the horizon, it is held.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bivariate {
     surface: Surface,
@@ -45,8 +45,8 @@ impl Bivariate {
             for column in 0..NODES {
                 let share = |n: usize| n as f64 / (NODES - 1) as f64;
                 let pose = Bisected {
-                    theta_h: share(column).powi(2) * std::f64::consts::FRAC_PI_2,
-                    theta_d: share(row) * std::f64::consts::FRAC_PI_2,
+                    theta_h: 2.0 * share(column).powi(2).atan(),
+                    theta_d: 2.0 * share(row).atan(),
                 };
                 nodes.extend(logs(surface.at(pose, None)).to_array());
             }
@@ -67,17 +67,18 @@ impl Brdf for Bivariate {
             return DVec3::ZERO;
         }
         let (sum, difference) = (incident + exitant, incident - exitant);
-        let half = (sum.x * sum.x + sum.y * sum.y).sqrt() as f32;
-        let theta_h = half.atan2(sum.z as f32);
-        let theta_d = (difference.length() as f32).atan2(sum.length() as f32);
+        let flat = sum.x * sum.x + sum.y * sum.y;
+        let length = (flat + sum.z * sum.z).sqrt() as f32;
+        // tan(θ/2) = sin θ/(1 + cos θ); |ω_i − ω_o| = 2 sin θ_d and |ω_i + ω_o| = 2 cos θ_d.
+        let half = flat.sqrt() as f32 / (length + sum.z as f32).max(f32::MIN_POSITIVE);
+        let between = difference.length() as f32 / (2.0 + length);
         let place = |share: f32| {
             let place = share.clamp(0.0, 1.0) * (NODES - 1) as f32;
             let cell = (place as usize).min(NODES - 2);
             (cell, place - cell as f32)
         };
-        let quarter = std::f32::consts::FRAC_PI_2;
-        let (column, across) = place((theta_h / quarter).sqrt());
-        let (row, along) = place(theta_d / quarter);
+        let (column, across) = place(half.sqrt());
+        let (row, along) = place(between);
         let near = |row: usize| {
             let first = 3 * (row * NODES + column);
             let pair = &self.logs[first..first + 7];
