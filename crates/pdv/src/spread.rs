@@ -32,6 +32,18 @@ pub enum Distribution {
     Lobe,
 }
 
+impl Distribution {
+    /// As job files name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Capped => "capped",
+            Self::Paper => "paper",
+            Self::Uniform => "uniform",
+            Self::Lobe => "lobe",
+        }
+    }
+}
+
 /// Where the readings of a plane are to be taken.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Spread {

@@ -10,7 +10,7 @@ study = \"error-against-time\"
 materials = [\"gold-paint\", \"blue-rubber\", \"brass\"]
 every = 2
 models = [\"separable\", \"reciprocal\"]
-plans = { planes_deg = [[30.0]], readings = [8], arc = [0, 8] }
+plans = { planes_deg = [[30.0]], readings = [8], distribution = \"capped\", arc = [0, 8] }
 pca = { readings = [2], folds = 3 }
 compare = { pairs = 500, theta_max_deg = 80.0, seed = 3 }
 ";

@@ -77,6 +77,7 @@ pub(crate) fn floor(grid: &Grid, judge: &Judge, material: &Material) -> Result<V
         let plan = super::GridPlan {
             planes_deg: planes_deg.to_vec(),
             readings: DENSE,
+            distribution: pdv::Distribution::Capped,
             arc: DENSE,
         };
         for &model in grid.models.iter().filter(|&&model| plan.suits(model)) {

@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use pdv::Draw;
+use pdv::{Distribution, Draw};
 use serde::Deserialize;
 use sweep::Model;
 
@@ -47,6 +47,7 @@ struct RawPlans {
     planes_deg: Vec<Vec<f64>>,
     readings: Vec<usize>,
     arc: Vec<usize>,
+    distribution: Distribution,
 }
 
 #[derive(Deserialize)]
@@ -105,6 +106,7 @@ impl Grid {
                     let plan = GridPlan {
                         planes_deg: planes_deg.clone(),
                         readings,
+                        distribution: plans.distribution,
                         arc,
                     };
                     plan.job()?;

@@ -1,3 +1,4 @@
+use pdv::Distribution;
 use sweep::{Job, Model};
 
 use crate::Error;
@@ -9,6 +10,8 @@ pub struct GridPlan {
     pub planes_deg: Vec<f64>,
     /// Readings of each plane.
     pub readings: usize,
+    /// How their d_p are distributed.
+    pub distribution: Distribution,
     /// Readings of the arc; 0: no arc.
     pub arc: usize,
 }
@@ -33,8 +36,12 @@ impl GridPlan {
     /// # Errors
     /// What a job file may not ask for.
     pub fn job(&self) -> Result<Job, Error> {
-        let readings = self.readings;
-        let plane = |theta_r: &f64| format!("[[plane]]\ntheta_r_deg = {theta_r:?}\nreadings = {readings}\n");
+        let (readings, distribution) = (self.readings, self.distribution.name());
+        let plane = |theta_r: &f64| {
+            format!(
+                "[[plane]]\ntheta_r_deg = {theta_r:?}\nreadings = {readings}\ndistribution = \"{distribution}\"\n"
+            )
+        };
         let mut text: String = self.planes_deg.iter().map(plane).collect();
         if self.arc > 0 {
             text += &format!("[arc]\nreadings = {}\n", self.arc);
