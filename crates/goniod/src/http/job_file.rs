@@ -84,4 +84,6 @@ enum ModelName {
     Separable,
     Reciprocal,
     Planes,
+    Bivariate,
+    Auto,
 }
