@@ -16,7 +16,8 @@ pub(super) struct Observer {
     shared: Arc<Shared>,
     news: mpsc::UnboundedSender<News>,
     run: String,
-    /// What the reflectance of a reading rests on: header, first beginning, readings in the dark and of a reference.
+    /// What the reflectance of a reading rests on: header, first beginning, readings in the dark and of a reference, and
+    /// the one that ends each series in the dark, or two series would count as one.
     basis: Vec<Record>,
     /// The fault that ended the capture.
     pub(super) fault: Option<FaultCode>,
@@ -149,7 +150,10 @@ impl Observer {
         let rests_on = match record {
             Record::Header(_) => true,
             Record::Begin { .. } => self.basis.len() < 2,
-            Record::Reading(reading) => !reading.lamp || reading.sweep == Sweep::Reference,
+            Record::Reading(reading) => {
+                let after_dark = matches!(self.basis.last(), Some(Record::Reading(last)) if !last.lamp);
+                !reading.lamp || after_dark || reading.sweep == Sweep::Reference
+            }
             _ => false,
         };
         if rests_on {

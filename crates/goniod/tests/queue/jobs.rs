@@ -1,6 +1,8 @@
-use goniod::{Action, JobState, RefusalKind};
+use capture::{FileJournal, Record};
+use goniod::{Action, JobState, RefusalKind, What};
+use rig::RigFile;
 
-use crate::bench::{Bench, SHORT, idle, on_stage, operator, readings, rig, state, submission};
+use crate::bench::{Bench, SHORT, idle, on_stage, operator, readings, rig, state, submission, until};
 
 #[tokio::test]
 async fn a_job_waits_for_its_specimen_and_leaves_a_whole_run() {
@@ -56,6 +58,45 @@ async fn jobs_whose_specimen_lies_there_follow_each_other() {
     state(&mut events, first.id, JobState::Done).await;
     state(&mut events, second.id, JobState::Done).await;
     assert_eq!(daemon.runs().await.unwrap().len(), 2);
+    daemon.shutdown().await;
+}
+
+/// What is shown while a run goes on is what its report would say of the readings until then, also where the dark level
+/// was read more than once.
+#[tokio::test]
+async fn a_live_reading_is_what_a_report_at_that_moment_would_say() {
+    let bench = Bench::new("calibration.dark_every_min = 0.02");
+    let daemon = bench.open().await;
+    let mut events = daemon.events(None);
+    let job = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    let mut live = Vec::new();
+    let run = until(&mut events, |event| match &event.what {
+        What::Reading { reading, .. } => {
+            live.push((**reading).clone());
+            None
+        }
+        What::Job { job: now } if now.id == job.id && now.state == JobState::Done => now.run.clone(),
+        _ => None,
+    })
+    .await;
+    let directory = daemon.run(&run).await.unwrap().directory;
+    let records = FileJournal::read(directory.join("journal")).unwrap();
+    let rig = RigFile::parse(&bench.rig, "rig.toml".as_ref()).unwrap();
+    let ends = (0..records.len()).filter(|&i| matches!(records[i], Record::Reading(_)));
+    let reported: Vec<_> = ends
+        .map(|i| report::measurements(&records[..=i], &rig).pop().unwrap())
+        .collect();
+    let sets = reported.chunk_by(|a, b| a.reading.lamp == b.reading.lamp);
+    assert!(sets.count() > 4, "several series of dark readings");
+    assert_eq!(live.len(), reported.len());
+    for (live, reported) in live.iter().zip(&reported) {
+        assert_eq!(
+            live.f,
+            reported.rgb().map(|rgb| rgb.to_array()),
+            "step {}",
+            live.step
+        );
+    }
     daemon.shutdown().await;
 }
 
