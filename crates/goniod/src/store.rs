@@ -149,9 +149,12 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    /// The fault that it is.
+    /// The fault that it is (SQLite, "Result and Error Codes"; an extended code has its primary one in the low byte).
     pub(crate) fn code(&self) -> FaultCode {
-        /// SQLITE_FULL; extended codes have it in their low byte.
+        const BUSY: u32 = 5;
+        const LOCKED: u32 = 6;
+        const READONLY: u32 = 8;
+        const IOERR: u32 = 10;
         const FULL: u32 = 13;
         let (Self::Open { source, .. } | Self::Query { source, .. }) = self else {
             return FaultCode::Store;
@@ -162,6 +165,9 @@ impl StoreError {
         let code = code.and_then(|code| code.parse::<u32>().ok());
         match code.map(|code| code & 0xFF) {
             Some(FULL) => FaultCode::DiskFull,
+            Some(BUSY | LOCKED) => FaultCode::StoreLocked,
+            Some(READONLY) => FaultCode::ReadOnly,
+            Some(IOERR) => FaultCode::DiskError,
             _ => FaultCode::Store,
         }
     }

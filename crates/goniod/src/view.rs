@@ -142,7 +142,13 @@ pub enum FaultCode {
     Setup,
     /// The disk is full.
     DiskFull,
-    /// The store cannot be written: locked, read-only, damaged.
+    /// Another program keeps the store locked.
+    StoreLocked,
+    /// The store may not be written.
+    ReadOnly,
+    /// The disk, or its file system, refuses for a reason of its own.
+    DiskError,
+    /// The store cannot be read or written for another reason, such as damage.
     Store,
     /// Results cannot be written.
     Report,

@@ -522,6 +522,23 @@ mod tests {
         store.close().await;
     }
 
+    /// The pragma stands for a file that may not be written, which root may always: it is the same error.
+    #[tokio::test]
+    async fn a_store_that_may_not_be_written_is_told_as_such_and_can_be_read() {
+        let folder = TempDir::new().unwrap();
+        let path = folder.path().join("goniod.db");
+        let store = Sqlite::open(&path).await.unwrap();
+        let run = with_run(&store).await;
+        sqlx::query("PRAGMA query_only = 1")
+            .execute(&store.writer)
+            .await
+            .unwrap();
+        let error = store.append(&run.id, 1, &end("first")).await.unwrap_err();
+        assert_eq!(error.code(), FaultCode::ReadOnly, "{error:?}");
+        assert_eq!(store.records(&run.id).await.unwrap(), [end("the header")]);
+        store.close().await;
+    }
+
     #[tokio::test]
     async fn what_is_no_database_is_not_opened() {
         let folder = TempDir::new().unwrap();

@@ -94,7 +94,7 @@ async fn a_database_that_another_program_locks() {
     while sqlx::query("BEGIN IMMEDIATE").execute(&mut other).await.is_err() {}
     let view = rig(&daemon, |rig| rig.fault.is_some()).await;
     let fault = view.fault.expect("just seen");
-    assert_eq!(fault.code, FaultCode::Store);
+    assert_eq!(fault.code, FaultCode::StoreLocked);
     assert!(fault.text.contains("locked"), "{fault:?}");
     sqlx::query("ROLLBACK").execute(&mut other).await.unwrap();
     other.close().await.unwrap();
