@@ -33,6 +33,7 @@ fn every_command_has_a_manual_page() {
         "gonioctl-doctor.1",
         "gonioctl-run.1",
         "gonioctl-plan.1",
+        "goniod.1",
     ] {
         let text = fs::read_to_string(pages.join(page)).unwrap();
         assert!(text.contains(".SH SYNOPSIS"), "{page}: {text}");

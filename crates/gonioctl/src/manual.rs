@@ -24,12 +24,13 @@ pub(crate) fn completions(shell: Shell) -> anyhow::Result<()> {
     }
 }
 
-/// Writes the manual pages, one for each command, into a directory that is made where there is none.
+/// Writes the manual pages, one for each command and one for the daemon, into a directory that is made where there is none.
 ///
 /// # Errors
 /// The directory cannot be made or written.
 pub(crate) fn man(directory: &Path) -> anyhow::Result<()> {
     std::fs::create_dir_all(directory)
         .and_then(|()| clap_mangen::generate_to(Cli::command(), directory))
+        .and_then(|()| clap_mangen::generate_to(goniod::command(), directory))
         .with_context(|| format!("cannot write manual pages into {}", directory.display()))
 }

@@ -36,7 +36,7 @@ pub use order::{Order, rig_text};
 pub use rebuild::rebuild;
 pub use refusal::{Refusal, RefusalKind};
 pub use run::{Ended, resume, run};
-pub use service::main;
+pub use service::{command, main};
 pub use state::JobState;
 pub use status::Status;
 pub use store::{Sqlite, Store, StoreError};

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 use std::time::SystemTime;
 
 use anyhow::Context;
-use clap::{Parser, ValueEnum};
+use clap::{CommandFactory, Parser, ValueEnum};
 use rig::RigFile;
 use sd_notify::NotifyState;
 use tokio::signal::unix::{SignalKind, signal};
@@ -55,6 +55,11 @@ enum Log {
     Human,
     /// A JSON object a line.
     Json,
+}
+
+/// The daemon's command line, of which its manual page is made.
+pub fn command() -> clap::Command {
+    Arguments::command()
 }
 
 /// Runs the daemon as this process and returns its exit code.
