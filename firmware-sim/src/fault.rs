@@ -48,6 +48,9 @@ pub enum Disturbance {
     /// So much light gets in from outside for so long that every channel is full.
     #[serde(rename = "glare_s", with = "seconds")]
     Glare(Duration),
+    /// The door at the photometer's contact is open for so long.
+    #[serde(rename = "door_s", with = "seconds")]
+    Door(Duration),
     /// The device answers under this id from now on, as one that was set up wrongly.
     Id(u8),
 }

@@ -14,8 +14,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use arms::{Arm, Pose};
-use rig::dynamixel::register::{Register, servo};
-use rig::{Detector, Device, Observation, Rig, RigFile, Snapshot};
+use rig::dynamixel::register::{self, Register, servo};
+use rig::{Detector, Device, Observation, Rig, RigFile, Snapshot, Surroundings};
 use tokio::time::Instant;
 
 pub use axis::InProcessAxis;
@@ -99,6 +99,24 @@ impl Rig for InProcessRig {
             snapshot: self.snapshot().await?,
             ticks: self.photometer.ticks().await?,
             counts: self.photometer.counts().await?,
+        })
+    }
+
+    async fn surroundings(&mut self) -> Result<Surroundings, InProcessError> {
+        let read = |device, register| self.bench.read(device, register).map(|value| value as f64);
+        let servo = |register| {
+            let [light, sensor] = [Device::Light, Device::Sensor].map(|device| read(device, register));
+            Ok::<_, InProcessError>([light?, sensor?])
+        };
+        let [light_c, sensor_c] = servo(servo::PRESENT_TEMPERATURE)?;
+        Ok(Surroundings {
+            supply_v: servo(servo::PRESENT_INPUT_VOLTAGE)?.map(|tenths| tenths / 10.0),
+            temperature_c: [
+                light_c,
+                sensor_c,
+                read(Device::Photometer, register::photometer::TEMPERATURE)?,
+            ],
+            door_open: self.bench.read(Device::Photometer, register::photometer::DOOR)? == 1,
         })
     }
 

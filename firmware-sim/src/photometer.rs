@@ -57,6 +57,7 @@ pub(crate) struct Photometer {
     deaf_until: Duration,
     silent_until: Duration,
     glare_until: Duration,
+    door_until: Duration,
     integration: Option<Integration>,
     triggers: u64,
     delay: Option<Duration>,
@@ -80,6 +81,7 @@ impl Photometer {
             deaf_until: Duration::ZERO,
             silent_until: Duration::ZERO,
             glare_until: Duration::ZERO,
+            door_until: Duration::ZERO,
             integration: None,
             triggers: 0,
             delay: None,
@@ -120,17 +122,22 @@ impl Photometer {
 
     /// When something happens by itself next.
     pub(crate) fn next_event(&self) -> Option<Duration> {
-        [self.deaf_until, self.silent_until, self.glare_until]
-            .map(Some)
-            .into_iter()
-            .chain([
-                self.watchdog(),
-                self.faults.next(),
-                self.integration.map(|running| running.end),
-            ])
-            .flatten()
-            .filter(|&at| at > self.now)
-            .min()
+        [
+            self.deaf_until,
+            self.silent_until,
+            self.glare_until,
+            self.door_until,
+        ]
+        .map(Some)
+        .into_iter()
+        .chain([
+            self.watchdog(),
+            self.faults.next(),
+            self.integration.map(|running| running.end),
+        ])
+        .flatten()
+        .filter(|&at| at > self.now)
+        .min()
     }
 
     fn watchdog(&self) -> Option<Duration> {
@@ -174,6 +181,7 @@ impl Photometer {
                     integration.end += duration;
                 }
             }
+            Disturbance::Door(duration) => self.door_until = self.now + duration,
             Disturbance::Glare(duration) => self.glare_until = self.now + duration,
             Disturbance::Id(id) => self.table.set(reg::ID, id.into()),
             // A servo's.

@@ -187,7 +187,10 @@ impl Servo {
             Disturbance::Sag(duration) => self.sags_until = self.now + duration,
             Disturbance::Id(id) => self.table.set(reg::ID, id.into()),
             // The photometer's.
-            Disturbance::RefusedTrigger | Disturbance::LostAcknowledgement | Disturbance::Glare(_) => {}
+            Disturbance::RefusedTrigger
+            | Disturbance::LostAcknowledgement
+            | Disturbance::Glare(_)
+            | Disturbance::Door(_) => {}
         }
     }
 

@@ -36,6 +36,8 @@ pub enum State {
     Running,
     /// Holding, on the operator's wish.
     Paused,
+    /// Holding, until something is as the rig file wants it.
+    Suspended,
     /// Lamp off, arms stopped and disengaged.
     ShuttingDown,
 }
@@ -48,6 +50,11 @@ pub enum Event {
     State {
         /// What.
         state: State,
+    },
+    /// It holds by itself; [`State::Running`] says that it goes on.
+    Suspended {
+        /// Why, in words.
+        why: String,
     },
     /// A step begins.
     Step {

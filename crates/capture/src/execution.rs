@@ -11,6 +11,7 @@ use crate::run::Ask;
 use crate::{CaptureError, Command, Event, Flag, Journal, Reading, Record, State, closed, mechanics};
 
 mod shutdown;
+mod suspend;
 
 pub(crate) use shutdown::Interrupt;
 
@@ -44,6 +45,11 @@ pub(crate) struct Execution<'a, R: Rig> {
     /// Device time at the end of the last step.
     mark: u64,
     lamp: bool,
+    /// How bright it was last, relative to its nominal output, and the exposure that showed it.
+    lamp_rel: Option<f64>,
+    lamp_exposure: Option<Exposure>,
+    /// Device time at which the surroundings were judged last.
+    judged: Option<u64>,
     /// Whether a device was told anything: until each has said who it is, none is.
     touched: bool,
     /// Whether the arms stand where the plan left them, so that a step's own path leads on.
@@ -90,6 +96,9 @@ impl<'a, R: Rig> Execution<'a, R> {
             clock: DeviceClock::default(),
             mark: 0,
             lamp: false,
+            lamp_rel: None,
+            lamp_exposure: None,
+            judged: None,
             touched: false,
             on_path: false,
         }
@@ -100,6 +109,7 @@ impl<'a, R: Rig> Execution<'a, R> {
         self.state(State::Identifying);
         self.begin().await?;
         self.drive.rest().await?;
+        self.suspend().await?;
         self.state(State::Engaging);
         self.touched = true;
         self.drive.engage_all().await?;
@@ -117,6 +127,7 @@ impl<'a, R: Rig> Execution<'a, R> {
                     continue;
                 }
                 self.obey().await?;
+                self.suspend().await?;
                 self.step(&step).await?;
             }
             if !self.extend().await? {
@@ -229,6 +240,9 @@ impl<'a, R: Rig> Execution<'a, R> {
             let counts = self.drive.expose(exposure).await?;
             if step.lamp && self.lamp_is_out(&counts) {
                 return Err(Interrupt::Lamp);
+            }
+            if step.lamp && self.file.visits.lamp == Lamp::Monitor {
+                self.note_lamp(&counts);
             }
             let better = match fixed {
                 None if left > 0 => self.ranging.better(&counts),
@@ -438,6 +452,7 @@ fn last_ticks(records: &[Record]) -> Option<u64> {
     records.iter().rev().find_map(|record| match record {
         Record::Reading(reading) | Record::Repeat { reading, .. } => Some(reading.device_ticks),
         Record::Begin { device_ticks, .. } => Some(*device_ticks),
+        Record::Suspended { device_ticks, .. } | Record::Released { device_ticks, .. } => Some(*device_ticks),
         Record::End { device_ticks, .. } => *device_ticks,
         Record::Header(_) | Record::Extension(_) => None,
     })

@@ -150,6 +150,10 @@ impl Journal for FileJournal {
     fn records(&self) -> &[Record] {
         &self.records
     }
+
+    fn room(&self) -> Option<u64> {
+        rig::doctor::room(&self.path).ok()
+    }
 }
 
 fn io<'a>(what: &'static str, path: &'a Path) -> impl Fn(std::io::Error) -> JournalError + 'a {

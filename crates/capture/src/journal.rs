@@ -104,6 +104,22 @@ pub enum Record {
         /// By how much the brightest channel differs from before, relative to the lamp monitor; dark counts included.
         difference_rel: f64,
     },
+    /// The run holds by itself.
+    Suspended {
+        /// Why, in words.
+        why: String,
+        /// Unwrapped device time, ticks of 10 µs.
+        device_ticks: u64,
+        /// Wall clock, RFC 3339, UTC.
+        at: String,
+    },
+    /// It goes on.
+    Released {
+        /// Unwrapped device time, ticks of 10 µs.
+        device_ticks: u64,
+        /// Wall clock, RFC 3339, UTC.
+        at: String,
+    },
     /// An execution ended.
     End {
         /// How.
@@ -129,4 +145,9 @@ pub trait Journal: Send {
 
     /// All records, oldest first.
     fn records(&self) -> &[Record];
+
+    /// Bytes that there is room for where they are kept; `None` where nobody knows.
+    fn room(&self) -> Option<u64> {
+        None
+    }
 }

@@ -37,6 +37,7 @@ impl Progress {
     pub(crate) fn show(&mut self, event: &Event) {
         match event {
             Event::State { state } => self.bar.set_prefix(word(*state)),
+            Event::Suspended { why } => self.bar.suspend(|| print::say(format_args!("holding: {why}"))),
             Event::Step { sweep, .. } => self.bar.set_prefix(sweep.to_string()),
             Event::Progress {
                 done,
@@ -86,6 +87,7 @@ fn word(state: State) -> &'static str {
         State::WarmingUp => "warm up",
         State::Running => "run",
         State::Paused => "paused",
+        State::Suspended => "suspended",
         State::ShuttingDown => "shut down",
     }
 }

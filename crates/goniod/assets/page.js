@@ -9,7 +9,7 @@ const $ = (id) => document.getElementById(id);
 
 const WORDS = {
   idle: "idle", identifying: "asking the devices", engaging: "engaging", warming_up: "lamp warms up", running: "running",
-  paused: "paused", shutting_down: "coming to rest", reporting: "writing the report", moving: "moving",
+  paused: "paused", suspended: "holding by itself", shutting_down: "coming to rest", reporting: "writing the report", moving: "moving",
   queued: "queued", awaiting_specimen: "awaiting specimen", stopping: "stopping", interrupted: "interrupted",
   done: "done", failed: "failed", cancelled: "cancelled",
 };

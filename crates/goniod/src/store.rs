@@ -16,6 +16,11 @@ pub use sqlite::Sqlite;
 /// What a method has returned from is durable. One daemon writes at a time.
 #[async_trait]
 pub trait Store: Send + Sync + 'static {
+    /// Bytes that the medium has room for; `None` where nobody knows.
+    fn room(&self) -> Option<u64> {
+        None
+    }
+
     /// Counts another start of the daemon; the first is 1.
     ///
     /// # Errors

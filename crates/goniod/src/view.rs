@@ -56,6 +56,8 @@ pub enum Activity {
     Running,
     /// Holding, on an operator's wish.
     Paused,
+    /// Holding, until something is as the rig file wants it.
+    Suspended,
     /// Lamp off, arms come to rest.
     ShuttingDown,
     /// Writing what follows from the readings.
@@ -72,6 +74,7 @@ impl From<capture::State> for Activity {
             capture::State::WarmingUp => Self::WarmingUp,
             capture::State::Running => Self::Running,
             capture::State::Paused => Self::Paused,
+            capture::State::Suspended => Self::Suspended,
             capture::State::ShuttingDown => Self::ShuttingDown,
         }
     }

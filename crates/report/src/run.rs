@@ -179,6 +179,11 @@ impl Run {
                         .add(reading.sweep.to_string(), clock, reading.device_ticks);
                     clock = reading.device_ticks;
                 }
+                Record::Suspended { device_ticks, .. } => clock = *device_ticks,
+                Record::Released { device_ticks, .. } => {
+                    run.seconds.add("suspended".into(), clock, *device_ticks);
+                    clock = *device_ticks;
+                }
                 Record::End {
                     outcome,
                     device_ticks,

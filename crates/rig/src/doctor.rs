@@ -14,7 +14,7 @@ mod round_trip;
 
 pub use census::census;
 pub use devices::{device, pose};
-pub use disk::disk;
+pub use disk::{disk, room};
 pub use finding::{Bin, Finding, Verdict};
 pub use host::Host;
 pub use light::light;

@@ -3,7 +3,7 @@ use std::time::Duration;
 use arms::Arm;
 use tokio::sync::watch;
 
-use crate::{Detector, Phase, Rig, RigFile, Snapshot};
+use crate::{Detector, Phase, Rig, RigFile, Snapshot, Surroundings};
 
 mod all;
 mod error;
@@ -183,6 +183,15 @@ impl<R: Rig> Drive<R> {
             .await?;
         self.lamp = on;
         Ok(())
+    }
+
+    /// Supply, temperatures, door.
+    ///
+    /// # Errors
+    /// A silent device.
+    pub async fn surroundings(&mut self) -> Result<Surroundings, DriveError<R::Error>> {
+        self.retry("read the rig's surroundings", |rig| Box::pin(rig.surroundings()))
+            .await
     }
 
     /// The photometer's clock now, ticks of 10 µs, 24 bits, wraps.

@@ -33,6 +33,8 @@ pub struct RigFile {
     pub visits: Visits,
     /// Stored calibrations.
     pub certificates: Certificates,
+    /// When a run holds by itself.
+    pub suspend: Suspend,
     /// What is known of the uncertainties.
     pub uncertainty: Uncertainties,
     /// The `[sim]` table, parsed by the simulator alone.
@@ -40,6 +42,44 @@ pub struct RigFile {
     /// SHA-256, hexadecimal, of everything in the file that a calibration depends on: arms, photometer, filling and
     /// constants, with the defaults filled in.
     pub fingerprint: String,
+}
+
+/// `[suspend]`: when a run holds by itself, and goes on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Suspend {
+    /// Time between two looks.
+    pub every: Duration,
+    /// Temperature of any device, °C.
+    pub temperature_c: Option<Band>,
+    /// Supply of any servo, V.
+    pub supply_v: Option<Band>,
+    /// By how much the lamp monitor is off its nominal output, relative.
+    pub lamp_rel: Option<Band>,
+    /// Room where the readings are kept, bytes.
+    pub disk_bytes: Option<Band>,
+    /// Whether an open door holds.
+    pub door: bool,
+}
+
+/// Two bounds of a value: beyond the first a run holds, and only within the second it goes on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Band {
+    /// Where it holds.
+    pub hold: f64,
+    /// Where it goes on.
+    pub release: f64,
+}
+
+impl Band {
+    /// Whether a value is one at which to hold, or to go on holding. Too low where the first bound is below the
+    /// second, else too high; NaN is neither.
+    pub fn holds(self, value: f64, holding: bool) -> bool {
+        let bound = if holding { self.release } else { self.hold };
+        match self.hold < self.release {
+            true => value < bound,
+            false => value > bound,
+        }
+    }
 }
 
 /// `[calibration]`: what is repeated during a run.

@@ -15,6 +15,7 @@ mod error;
 mod fault;
 mod file;
 mod rig;
+mod surroundings;
 
 pub use actuator::{Actuator, Identity, Location};
 pub use axis::{ACCELERATION_UNIT_RAD_S2, Axis, COUNTS_PER_TURN, VELOCITY_UNIT_RAD_S};
@@ -28,7 +29,8 @@ pub use dynamixel::{Adapter, Dynamixel, Usb, ports};
 pub use error::{Place, RigError};
 pub use fault::{Device, Fault, FaultKind};
 pub use file::{
-    Approach, ArmSettings, BusSettings, Certificates, Estop, MotionSettings, PhotometerSettings, Port,
-    RigFile, Uncertainties, Visits,
+    Approach, ArmSettings, Band, BusSettings, Certificates, Estop, MotionSettings, PhotometerSettings, Port,
+    RigFile, Suspend, Uncertainties, Visits,
 };
 pub use rig::{Observation, Rig, Snapshot};
+pub use surroundings::Surroundings;

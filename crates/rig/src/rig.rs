@@ -3,7 +3,7 @@ use std::time::Duration;
 
 use arms::{Arm, Pose};
 
-use crate::{Actuator, Counts, Detector, DetectorStatus, Fault, Location};
+use crate::{Actuator, Counts, Detector, DetectorStatus, Fault, Location, Surroundings};
 
 /// The whole rig at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,6 +69,12 @@ pub trait Rig: Send {
     /// # Errors
     /// No reply from one of them.
     fn observe(&mut self) -> impl Future<Output = Result<Observation, Self::Error>> + Send;
+
+    /// Supply, temperatures, door.
+    ///
+    /// # Errors
+    /// No reply from one of them.
+    fn surroundings(&mut self) -> impl Future<Output = Result<Surroundings, Self::Error>> + Send;
 
     /// Lets time pass: sleeps on a real bus, tells a simulated one in wire time to advance its clock.
     ///

@@ -40,6 +40,7 @@ impl Device for Photometer {
         let mut live = self.table.clone();
         let temperature = self.temperature_c(self.now.as_secs_f64());
         live.set(reg::TEMPERATURE, temperature.round().clamp(0.0, 255.0) as i64);
+        live.set(reg::DOOR, i64::from(self.now < self.door_until));
         live.set(reg::PRESENT_TIME, self.ticks(self.now));
         Ok((address..address + length)
             .map(|address| live.byte(address))

@@ -29,12 +29,13 @@ pub(super) const BLUE: Register = Register::new(140, 4, Read, 0, COUNTS);
 pub(super) const MONITOR: Register = Register::new(144, 4, Read, 0, COUNTS);
 pub(super) const DEVICE_TIME: Register = Register::new(148, 4, Read, 0, COUNTS);
 pub(super) const TEMPERATURE: Register = Register::new(152, 1, Read, 25, (0, 255));
+pub(super) const DOOR: Register = Register::new(153, 1, Read, 0, (0, 1));
 pub(super) const PRESENT_TIME: Register = Register::new(156, 4, Read, 0, COUNTS);
 pub(super) const CLOCK: Register = Register::new(200, 1, Read, 0, (0, 1));
 pub(super) const DELAY: Register = Register::new(204, 4, Write, 0, (0, 10_000_000));
 
 /// All of them.
-pub(super) const REGISTERS: [Register; 25] = [
+pub(super) const REGISTERS: [Register; 26] = [
     MODEL_NUMBER,
     FIRMWARE,
     ID,
@@ -57,6 +58,7 @@ pub(super) const REGISTERS: [Register; 25] = [
     MONITOR,
     DEVICE_TIME,
     TEMPERATURE,
+    DOOR,
     PRESENT_TIME,
     CLOCK,
     DELAY,

@@ -20,6 +20,8 @@ pub(crate) struct MemoryJournal {
     pub(crate) records: Vec<Record>,
     /// Called before a record is kept; may refuse it.
     pub(crate) at_append: AtAppend,
+    /// Bytes that the medium has room for.
+    pub(crate) room: Option<u64>,
 }
 
 impl MemoryJournal {
@@ -36,6 +38,7 @@ impl MemoryJournal {
         Self {
             records: vec![Record::Header(header)],
             at_append: Box::new(|_| Ok(())),
+            room: None,
         }
     }
 
@@ -72,6 +75,10 @@ impl Journal for MemoryJournal {
 
     fn records(&self) -> &[Record] {
         &self.records
+    }
+
+    fn room(&self) -> Option<u64> {
+        self.room
     }
 }
 

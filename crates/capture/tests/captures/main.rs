@@ -5,5 +5,6 @@ mod extensions;
 mod faults;
 mod journal;
 mod operator;
+mod suspend;
 mod time;
 mod whole;

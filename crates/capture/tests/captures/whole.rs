@@ -243,6 +243,7 @@ async fn events_tell_the_story_in_order() {
                 Event::Step { .. } => "step".to_owned(),
                 Event::Reading { .. } => "reading".to_owned(),
                 Event::Repeat { .. } => "repeat".to_owned(),
+                Event::Suspended { .. } => "suspended".to_owned(),
                 Event::Fault { .. } => "fault".to_owned(),
                 Event::Progress { .. } => "progress".to_owned(),
             });

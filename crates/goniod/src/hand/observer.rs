@@ -93,6 +93,7 @@ impl Observer {
                     .send_modify(|view| view.progress = Some(progress));
                 self.shared.tell(What::Progress { progress });
             }
+            Event::Suspended { why } => self.shared.warn(format!("the run holds: {why}")),
             Event::Fault { kind, .. } => self.fault = Some(kind.into()),
         }
     }

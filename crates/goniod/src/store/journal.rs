@@ -60,4 +60,8 @@ impl Journal for StoreJournal {
     fn records(&self) -> &[Record] {
         &self.records
     }
+
+    fn room(&self) -> Option<u64> {
+        self.store.room()
+    }
 }

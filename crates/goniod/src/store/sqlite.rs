@@ -1,5 +1,5 @@
 use std::borrow::Cow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use async_trait::async_trait;
@@ -28,6 +28,7 @@ pub struct Sqlite {
     writer: SqlitePool,
     /// Another, so that whoever looks never keeps a reading from being stored.
     reader: SqlitePool,
+    path: PathBuf,
 }
 
 impl Sqlite {
@@ -66,7 +67,11 @@ impl Sqlite {
                 source,
             })?;
         let reader = pool().connect_with(options).await.map_err(cannot)?;
-        Ok(Self { writer, reader })
+        Ok(Self {
+            writer,
+            reader,
+            path: path.to_owned(),
+        })
     }
 }
 
@@ -84,6 +89,10 @@ fn migrations() -> Migrator {
 
 #[async_trait]
 impl Store for Sqlite {
+    fn room(&self) -> Option<u64> {
+        rig::doctor::room(&self.path).ok()
+    }
+
     async fn begin_life(&self, at: &str) -> Result<u64, StoreError> {
         let row = sqlx::query(
             "INSERT INTO lives (life, started) VALUES ((SELECT COALESCE(MAX(life), 0) + 1 FROM lives), $1) \
@@ -396,6 +405,8 @@ fn kind(record: &Record) -> &'static str {
         Record::Reading(_) => "reading",
         Record::Extension(_) => "extension",
         Record::Repeat { .. } => "repeat",
+        Record::Suspended { .. } => "suspended",
+        Record::Released { .. } => "released",
         Record::End { .. } => "end",
     }
 }

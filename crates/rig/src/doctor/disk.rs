@@ -10,16 +10,25 @@ const RUN: u64 = 60_000_000;
 /// Room for so many runs is none that will last the week.
 const RUNS: u64 = 100;
 
-/// How much room there is for run directories below a directory, which may not exist yet.
-pub fn disk(directory: &Path) -> Finding {
+/// Bytes that are free below a directory, which may not exist yet.
+///
+/// # Errors
+/// The system does not say.
+pub fn room(directory: &Path) -> std::io::Result<u64> {
     let existing = directory.ancestors().find(|path| path.is_dir());
     let place = existing
         .filter(|path| !path.as_os_str().is_empty())
         .unwrap_or(Path::new("."));
-    let free = match statvfs(place) {
-        Ok(system) => system.f_bavail * system.f_frsize,
+    let system = statvfs(place)?;
+    Ok(system.f_bavail * system.f_frsize)
+}
+
+/// How much room there is for run directories below a directory, which may not exist yet.
+pub fn disk(directory: &Path) -> Finding {
+    let free = match room(directory) {
+        Ok(free) => free,
         Err(error) => {
-            let text = format!("{}: {error}", place.display());
+            let text = format!("{}: {error}", directory.display());
             return Finding::fail("disk", text, "name a directory that can be read");
         }
     };

@@ -45,6 +45,9 @@ pub(super) const STATUS: Block = Block::span(photometer::STATUS, photometer::REA
 /// A whole reading of the photometer, from its status to its clock.
 pub(super) const READING: Block = Block::span(photometer::STATUS, photometer::PRESENT_TIME);
 
+/// Temperature and door contact of the photometer.
+pub(super) const CABINET: Block = Block::span(photometer::TEMPERATURE, photometer::DOOR);
+
 /// Registers that the indirect data of a servo show, in this order.
 const STATE_REGISTERS: [Register; 6] = [
     servo::TORQUE_ENABLE,

@@ -100,6 +100,10 @@ pub mod servo {
     pub const PRESENT_VELOCITY: Register = register(128, 4, "Present Velocity");
     /// Present Position, counts, signed.
     pub const PRESENT_POSITION: Register = register(132, 4, "Present Position");
+    /// Present Input Voltage, 0.1 V.
+    pub const PRESENT_INPUT_VOLTAGE: Register = register(144, 2, "Present Input Voltage");
+    /// Present Temperature, °C.
+    pub const PRESENT_TEMPERATURE: Register = register(146, 1, "Present Temperature");
     /// First of the 28 Indirect Addresses of 2 bytes each.
     pub const INDIRECT_ADDRESS_1: Register = register(168, 2, "Indirect Address 1");
     /// First of the 28 Indirect Data bytes.
@@ -138,6 +142,8 @@ pub mod photometer {
     pub const READING_TIME: Register = register(148, 4, "Reading: Device Time");
     /// Temperature, °C.
     pub const TEMPERATURE: Register = register(152, 1, "Temperature");
+    /// Door contact: 1 open.
+    pub const DOOR: Register = register(153, 1, "Door");
     /// Device time now, 10 µs, 24 bits.
     pub const PRESENT_TIME: Register = register(156, 4, "Present Time");
     /// Clock: 0 real, 1 simulated wire time.

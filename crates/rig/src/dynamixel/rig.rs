@@ -10,7 +10,7 @@ use super::node::{BROADCAST, Node, instruction};
 use super::photometer::Photometer;
 use super::register::{photometer, servo};
 use super::servo::Servo;
-use crate::{Device, Observation, Rig, RigError, RigFile, Snapshot};
+use crate::{Device, Observation, Rig, RigError, RigFile, Snapshot, Surroundings};
 
 /// Longest time that the photometer's Delay register takes at once (docs/photometer.md).
 const DELAY_MAX: Duration = Duration::from_secs(10);
@@ -181,6 +181,32 @@ impl Rig for Dynamixel {
             snapshot,
             ticks: block::ticks(&bytes),
             counts: block::reading(&bytes),
+        })
+    }
+
+    async fn surroundings(&mut self) -> Result<Surroundings, RigError> {
+        let (mut supply_v, mut temperature_c) = ([0.0; 2], [0.0; 3]);
+        for (i, servo) in self.servos.iter().enumerate() {
+            // Together they would have the length by which the answer to a ping is known.
+            let supply = servo
+                .node
+                .ask(Block::of(servo::PRESENT_INPUT_VOLTAGE))
+                .await?
+                .parameters;
+            supply_v[i] = f64::from(u16::from_le_bytes([supply[0], supply[1]])) / 10.0;
+            let temperature = servo
+                .node
+                .ask(Block::of(servo::PRESENT_TEMPERATURE))
+                .await?
+                .parameters;
+            temperature_c[i] = f64::from(temperature[0]);
+        }
+        let cabinet = self.photometer.node.ask(block::CABINET).await?.parameters;
+        temperature_c[2] = f64::from(cabinet[0]);
+        Ok(Surroundings {
+            supply_v,
+            temperature_c,
+            door_open: cabinet[1] == 1,
         })
     }
 

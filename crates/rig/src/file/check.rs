@@ -15,6 +15,7 @@ use crate::dynamixel::{BAUD_RATES, MODELS};
 use crate::{Axis, RigError};
 
 mod calibration;
+mod suspend;
 
 /// The text checked: each key for itself, then what keys say together.
 pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
@@ -49,6 +50,7 @@ pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
         calibration: calibration::constants(source, &raw.calibration)?,
         visits: calibration::visits(source, &raw.calibration, &envelope)?,
         certificates: calibration::certificates(source, &raw.calibration)?,
+        suspend: suspend::suspend(source, &raw.suspend)?,
         uncertainty: calibration::uncertainty(source, &raw.uncertainty)?,
         fingerprint: source.fingerprint(RigFile::BUILT_IN)?,
         envelope,

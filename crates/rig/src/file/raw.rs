@@ -12,6 +12,7 @@ pub(super) struct RawFile {
     pub(super) motion: RawMotion,
     pub(super) photometer: RawPhotometer,
     pub(super) calibration: RawCalibration,
+    pub(super) suspend: RawSuspend,
     pub(super) uncertainty: RawUncertainty,
     pub(super) sim: toml::Table,
 }
@@ -88,6 +89,17 @@ pub(super) struct RawCalibration {
     pub(super) certificate: Spanned<String>,
     pub(super) directory: Spanned<String>,
     pub(super) max_age_h: Spanned<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawSuspend {
+    pub(super) every_s: Spanned<f64>,
+    pub(super) temperature_c: Spanned<[f64; 2]>,
+    pub(super) supply_v: Spanned<[f64; 2]>,
+    pub(super) lamp_percent: Spanned<[f64; 2]>,
+    pub(super) disk_mb: Spanned<[f64; 2]>,
+    pub(super) door: bool,
 }
 
 #[derive(Deserialize)]

@@ -207,3 +207,29 @@ fn the_fingerprint_follows_what_a_calibration_depends_on() {
         assert_ne!(print(other), plain, "{other}");
     }
 }
+
+#[test]
+fn bounds_of_suspension_need_room_between_them() {
+    let parse = |suspend: &str| RigFile::parse(&format!("[suspend]\n{suspend}"), Path::new("test.toml"));
+    let suspend = parse("lamp_percent = [10, 5]\ndisk_mb = [0, 0]\nsupply_v = [9.8, 11.5]")
+        .unwrap()
+        .suspend;
+    let lamp = suspend.lamp_rel.unwrap();
+    assert!((lamp.hold - 0.1).abs() < 1e-12 && (lamp.release - 0.05).abs() < 1e-12);
+    assert_eq!(suspend.disk_bytes, None);
+    // Too high holds above the first and goes on at the second, too low likewise below.
+    assert!(lamp.holds(0.11, false) && !lamp.holds(0.07, false) && lamp.holds(0.07, true));
+    assert!(!lamp.holds(0.05, true) && !lamp.holds(f64::NAN, true));
+    let supply = suspend.supply_v.unwrap();
+    assert!(supply.holds(9.7, false) && !supply.holds(11.0, false) && supply.holds(11.0, true));
+    for bad in [
+        "lamp_percent = [5, 10]",
+        "supply_v = [11, 10]",
+        "temperature_c = [-5, -6]",
+        "disk_mb = [nan, 1]",
+    ] {
+        let text = parse(bad).unwrap_err().to_string();
+        assert!(text.contains("hold") && text.contains("line 2"), "{bad}: {text}");
+    }
+    assert!(parse("every_s = 0").is_err());
+}
