@@ -2,7 +2,7 @@ use std::path::Path;
 
 use goniod::Order;
 use serde_json::json;
-use sweep::{Plan, Sweep};
+use sweep::{Plan, Sweep, Until};
 
 use crate::print;
 use crate::progress::clock;
@@ -20,12 +20,32 @@ pub(crate) fn plan(job: &Path, rig: Option<&Path>, as_json: bool) -> anyhow::Res
             "overhead_s": plan.overhead_s,
             "readings": plan.steps.len(),
             "left_out": plan.left_out,
+            "open": plan.open,
+            "until": order.job.until,
             "steps": plan.steps.iter().map(step).collect::<Vec<_>>(),
         }))?;
         return Ok(());
     }
     list(&plan)?;
+    if let Some(until) = order.job.until {
+        print::line(then(until))?;
+    }
     Ok(())
+}
+
+/// What follows on the first sweeps, in words.
+fn then(until: Until) -> String {
+    let target = until
+        .target_male
+        .map(|male| format!(" until an error (MALE) of {male} is expected,"));
+    let budget = until
+        .budget_s
+        .map(|budget_s| format!(", at most until {} are over", clock(budget_s)));
+    format!(
+        "then       what the readings call for,{} or until nothing more would gain{}",
+        target.unwrap_or_default(),
+        budget.unwrap_or_default()
+    )
 }
 
 /// A step for machines, in degrees.

@@ -99,6 +99,7 @@ fn summary(ended: &Ended, wall_s: f64) -> serde_json::Value {
         "retries": run.retries,
         "flags": run.flags,
         "errors": ended.report.errors,
+        "adapted": ended.report.adapted,
     })
 }
 
@@ -120,6 +121,16 @@ fn say(ended: &Ended, wall_s: f64) {
         "readings  {} taken, {} of {} steps done, {} retries on the bus",
         run.readings.taken, run.readings.accepted, run.readings.planned, run.retries
     ));
+    if let Some(adapted) = &ended.report.adapted {
+        adapted
+            .added
+            .iter()
+            .for_each(|why| print::say(format_args!("added     {why}")));
+        adapted
+            .stopped
+            .iter()
+            .for_each(|why| print::say(format_args!("ended     {why}")));
+    }
     if let Some(errors) = &ended.report.errors {
         print::say("errors against the simulated specimen");
         for line in eval::lines(errors) {

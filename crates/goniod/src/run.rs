@@ -3,8 +3,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use capture::{Command, Event, FileJournal, Journal, Outcome, Record};
+use capture::{Command, Event, Extension, FileJournal, Journal, Outcome, Record, Thinking};
 use report::{Report, RunDirectory};
+use rig::RigFile;
+use sweep::Job;
 use tokio::sync::watch;
 
 use crate::{DaemonError, Order, Status, station::Station};
@@ -55,7 +57,15 @@ pub async fn run(
     let directory = RunDirectory::at(out.join(name(now, &id)));
     fs::create_dir(directory.path()).map_err(unwritable(out))?;
     let mut journal = FileJournal::create(directory.journal(), header)?;
-    finish(directory, &mut station, &mut journal, control, on_event).await
+    finish(
+        directory,
+        &order.job,
+        &mut station,
+        &mut journal,
+        control,
+        on_event,
+    )
+    .await
 }
 
 /// Goes on with a run that was stopped or failed; a run that is done already is only reported again.
@@ -82,23 +92,49 @@ pub async fn resume(
     }
     let order = Order::resumed(header)?;
     let mut station = Station::open(&order.rig, &order.rig_name)?;
-    finish(directory, &mut station, &mut journal, control, on_event).await
+    finish(
+        directory,
+        &order.job,
+        &mut station,
+        &mut journal,
+        control,
+        on_event,
+    )
+    .await
 }
 
 async fn finish(
     directory: RunDirectory,
+    job: &Job,
     station: &mut Station,
     journal: &mut FileJournal,
     control: watch::Receiver<Command>,
     on_event: &mut (dyn FnMut(Event) + Send),
 ) -> Result<Ended, DaemonError> {
-    let outcome = capture::run(&mut station.drive, journal, control, on_event).await?;
+    let mut ask = ask(job.clone(), station.drive.file().clone());
+    let outcome = capture::run_and_ask(&mut station.drive, journal, control, on_event, &mut ask).await?;
     let report = report::write(&directory, journal.records())?;
     Ok(Ended {
         directory,
         outcome,
         report,
     })
+}
+
+/// Asks a job what is measured next, on a thread of its own. Should that panic, nothing more is measured, and what was is
+/// kept.
+pub(crate) fn ask(job: Job, rig: RigFile) -> impl FnMut(&[Record]) -> Thinking + Send {
+    move |records| {
+        let (job, rig, records) = (job.clone(), rig.clone(), records.to_vec());
+        let thinking = tokio::task::spawn_blocking(move || report::extension(&job, &records, &rig));
+        Box::pin(async move {
+            thinking.await.unwrap_or_else(|error| Extension {
+                steps: Vec::new(),
+                why: format!("nothing is added: {error}"),
+                expected_male: None,
+            })
+        })
+    }
 }
 
 /// Makes the directory of the run directories and tries whether it can be written.

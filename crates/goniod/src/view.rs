@@ -276,6 +276,9 @@ pub struct PlanView {
     pub sweeps: Vec<SweepView>,
     /// What is left out and why.
     pub left_out: Vec<LeftOutView>,
+    /// Whether more may be added on the way, by what the readings say: then readings and seconds are those of the first
+    /// sweeps, and a job's `budget_s` is the most that the run takes.
+    pub open: bool,
 }
 
 /// Part of a plan.
@@ -321,6 +324,7 @@ impl From<&Plan> for PlanView {
             seconds: plan.seconds(),
             sweeps,
             left_out: left_out.collect(),
+            open: plan.open,
         }
     }
 }

@@ -3,6 +3,7 @@
 //! Everything but the journal is derived from it, written under a temporary name and renamed, and can be made again
 //! with [`reconstruct`]. The crate knows nothing of buses, of motion, or of how a run came about.
 
+mod adapt;
 mod check;
 mod checks;
 mod derive;
@@ -23,6 +24,7 @@ mod slice;
 mod standard;
 mod uncertainty;
 
+pub use adapt::{Adapted, extension};
 pub use check::{Check, Verdict};
 pub use derive::model;
 pub use directory::RunDirectory;

@@ -89,7 +89,7 @@ fn facts(report: &Report) -> Vec<(&'static str, String)> {
             )
         })
         .collect();
-    vec![
+    let mut facts = vec![
         ("State", state),
         ("Run", run.id.clone()),
         ("Began", run.started.clone()),
@@ -103,7 +103,15 @@ fn facts(report: &Report) -> Vec<(&'static str, String)> {
         ),
         ("Devices", devices.join(", ")),
         ("Program", format!("goniod {}", run.version)),
-    ]
+    ];
+    let expected = report.adapted.as_ref().and_then(|adapted| adapted.expected_male);
+    facts.extend(expected.map(|male| {
+        let found = report.errors.and_then(|errors| errors.overall.male);
+        let found = found.map(|male| format!("; against the simulated specimen it is {male:.5}"));
+        let found = found.unwrap_or_default();
+        ("Expected error", format!("MALE {male:.5}{found}"))
+    }));
+    facts
 }
 
 fn notes(report: &Report) -> Vec<String> {
@@ -118,6 +126,20 @@ fn notes(report: &Report) -> Vec<String> {
             .iter()
             .map(|about| format!("The reconstruction is {about}.")),
     );
+    if let Some(adapted) = &report.adapted {
+        notes.extend(
+            adapted
+                .added
+                .iter()
+                .map(|why| format!("Added on the way: {why}.")),
+        );
+        notes.extend(
+            adapted
+                .stopped
+                .iter()
+                .map(|why| format!("Nothing more was measured: {why}.")),
+        );
+    }
     notes.push(
         "The pictures show a sphere lit by two lamps; each channel c is shown as 1 − exp(−1.57 c) through the sRGB curve. preview.exr holds the values themselves.".to_owned(),
     );

@@ -10,8 +10,8 @@ use sweep::{Job, LeftOut};
 
 use crate::derive::{Sweeps, truth};
 use crate::{
-    Check, MonteCarlo, ReportError, Run, RunDirectory, checks, measurements, outline, preview, slice,
-    write_readings,
+    Adapted, Check, MonteCarlo, ReportError, Run, RunDirectory, checks, measurements, outline, preview,
+    slice, write_readings,
 };
 
 /// Azimuths at which the albedo of a model that is not constant along φ_p is taken.
@@ -29,6 +29,8 @@ pub struct Report {
     pub checks: Vec<Check>,
     /// Errors against the truth, where the built-in simulator knows it.
     pub errors: Option<Comparison>,
+    /// How a run that stops when good enough came to its end; what it expected stands beside `errors`.
+    pub adapted: Option<Adapted>,
     /// Why there is no reconstruction, where there is none.
     pub no_model: Option<String>,
     /// How the reconstruction was made.
@@ -57,6 +59,7 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
         });
     };
     let job = Job::parse(&header.job, "job file").map_err(ReportError::Job)?;
+    let job = capture::extended_plan(records).map_or(job.clone(), |plan| job.grown(&plan));
     let rig = RigFile::parse(&header.rig, "rig file".as_ref()).map_err(ReportError::Rig)?;
     let run = Run::new(header, records);
     let measurements = measurements(records, &rig);
@@ -88,6 +91,7 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
         specimen: job.specimen.clone(),
         checks: check(&run, &job, &sweeps, model.as_deref()),
         errors,
+        adapted: Adapted::new(records),
         no_model,
         model: model.as_ref().map(|model| model.about()),
         left_out: header.plan.left_out.clone(),

@@ -17,7 +17,7 @@ const TICK_S: f64 = 1e-5;
 /// What a capture on the simulated rig brought.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// Readings of each plane of the job, in its order.
+    /// Readings of each plane of the job, in its order, and of those that were added.
     pub planes: Vec<Vec<Observation>>,
     /// Readings of the arc.
     pub arc: Vec<Observation>,
@@ -28,6 +28,8 @@ pub struct Measured {
     /// Seconds that the rig took: the photometer's clock from power-on to the end, and for each exposure the time
     /// that its packets need on the bus, which the in-process rig does not have.
     pub rig_s: f64,
+    /// What was added on the way, of a job that says when to stop.
+    pub adapted: Option<report::Adapted>,
 }
 
 /// Captures a job on the in-process rig over a specimen, under a paused clock: planned and run as on any rig.
@@ -41,7 +43,9 @@ pub fn measure(job: &Job, rig: &RigFile, specimen: Arc<dyn Brdf>) -> Result<Meas
         .build()?;
     let (records, bus_s) = runtime.block_on(records(job, rig, specimen))?;
     let measurements = report::measurements(&records, rig);
-    let planes: Vec<_> = (0..job.planes.len())
+    let plan = capture::extended_plan(&records);
+    let planes = plan.map_or(job.planes.len(), |plan| job.grown(&plan).planes.len());
+    let planes: Vec<_> = (0..planes)
         .map(|i| report::observations(&measurements, Sweep::Plane(i)))
         .collect();
     let arc = report::observations(&measurements, Sweep::Arc);
@@ -59,6 +63,7 @@ pub fn measure(job: &Job, rig: &RigFile, specimen: Arc<dyn Brdf>) -> Result<Meas
         rig_s: ticks as f64 * TICK_S + measurements.len() as f64 * bus_s,
         planes,
         arc,
+        adapted: report::Adapted::new(&records),
     })
 }
 
@@ -88,7 +93,11 @@ async fn records(job: &Job, file: &RigFile, specimen: Arc<dyn Brdf>) -> Result<(
     let mut journal = MemoryJournal(vec![Record::Header(header)]);
     let mut drive = Drive::new(rig, file.clone());
     let (_sender, control) = watch::channel(Command::Run);
-    let outcome = capture::run(&mut drive, &mut journal, control, &mut |_| ())
+    let mut ask = |records: &[Record]| -> capture::Thinking {
+        // The clock stands still meanwhile, so that nobody has to look after the rig.
+        Box::pin(std::future::ready(report::extension(job, records, file)))
+    };
+    let outcome = capture::run_and_ask(&mut drive, &mut journal, control, &mut |_| (), &mut ask)
         .await
         .map_err(|error| failed(error.to_string()))?;
     match outcome {

@@ -6,8 +6,10 @@ use toml::Spanned;
 use crate::{Arc, Distribution, Job, Model, Plane, SweepError};
 
 mod scene;
+mod until;
 
 use scene::RawScene;
+use until::RawSweep;
 
 /// Most plane sweeps of one job: their order is found by trying every one.
 const MAX_PLANES: usize = 12;
@@ -31,6 +33,7 @@ struct RawJob {
     #[serde(default)]
     reconstruction: RawReconstruction,
     scene: Option<RawScene>,
+    sweep: Option<RawSweep>,
 }
 
 #[derive(Deserialize)]
@@ -149,6 +152,10 @@ impl Job {
                 distribution: plane.distribution,
             })
         });
+        let until = raw
+            .sweep
+            .map(|sweep| sweep.check(&source, raw.reconstruction.model))
+            .transpose()?;
         let arc = raw.arc.map(|arc| {
             let offset = arc
                 .offset
@@ -168,6 +175,7 @@ impl Job {
             arc: arc.transpose()?,
             model: raw.reconstruction.model,
             scene: raw.scene.map(|scene| scene.check(&source)).transpose()?,
+            until: until.flatten(),
         })
     }
 }

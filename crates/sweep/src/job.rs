@@ -18,6 +18,18 @@ pub struct Job {
     pub model: Model,
     /// What will be looked at; `None`: everything.
     pub scene: Option<Scene>,
+    /// When to stop; `None`: when everything that the job names was measured. Else its planes and arc are the first, and
+    /// what follows is decided on the way.
+    pub until: Option<Until>,
+}
+
+/// When a run stops to which sweeps are added on the way. It also does where nothing is expected to gain any more.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Until {
+    /// Expected MALE that is good enough, 1e-5 … 1.
+    pub target_male: Option<f64>,
+    /// Rig seconds of the whole run that may not be exceeded, 1 … 86 400.
+    pub budget_s: Option<f64>,
 }
 
 /// One plane sweep: the sensor stands at θ_r, the light crosses the plane.

@@ -3,6 +3,7 @@
 //! Pure: text and mechanics go in, a [`Plan`] comes out. Listing it, timing it and drawing it are functions of it;
 //! nothing here moves an arm, reads a clock or knows of devices.
 
+mod addition;
 mod error;
 mod file;
 mod job;
@@ -15,8 +16,9 @@ mod route;
 mod targets;
 mod unread;
 
+pub use addition::{Addition, add};
 pub use error::SweepError;
-pub use job::{Arc, Job, Model, Plane};
+pub use job::{Arc, Job, Model, Plane, Until};
 pub use mechanics::Mechanics;
 pub use pdv::{Cell, Distribution, Scene};
 pub use plan::{LeftOut, Plan, Step, Sweep};

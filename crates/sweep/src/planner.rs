@@ -21,7 +21,8 @@ const DARK_REPEATS: usize = 4;
 /// value in it is made of are left out.
 ///
 /// # Errors
-/// The arms stand outside the envelope; a sweep of which nothing can be measured on this rig, with its key and why.
+/// The arms stand outside the envelope; a sweep of which nothing can be measured on this rig, with its key and why; a
+/// budget that the sweeps of the job exceed.
 pub fn plan(job: &Job, mechanics: &Mechanics) -> Result<Plan, SweepError> {
     let start = mechanics
         .start
@@ -35,14 +36,25 @@ pub fn plan(job: &Job, mechanics: &Mechanics) -> Result<Plan, SweepError> {
         sweeps.push(arc(job, of, reach)?);
     }
     sweeps.retain(|sweep| !sweep.poses.is_empty());
-    let Some(scene) = &job.scene else {
-        return lay(job, mechanics, start, sweeps);
-    };
-    let whole = lay(job, mechanics, start, sweeps.clone())?;
-    unread::cut(job, scene, &mut sweeps, &whole);
+    if let Some(scene) = &job.scene {
+        let whole = lay(job, mechanics, start, sweeps.clone())?;
+        unread::cut(job, scene, &mut sweeps, &whole);
+    }
     let mut plan = lay(job, mechanics, start, sweeps)?;
-    plan.left_out.extend(unread::channels(scene));
-    Ok(plan)
+    plan.left_out.extend(job.scene.iter().flat_map(unread::channels));
+    plan.open = job.until.is_some();
+    let budget_s = job.until.and_then(|until| until.budget_s);
+    match budget_s.filter(|&budget_s| plan.seconds() > budget_s) {
+        Some(budget_s) => Err(SweepError::Unreachable {
+            file: job.name.clone(),
+            key: "sweep.budget_s".to_owned(),
+            why: format!(
+                "the first sweeps alone take {:.1} s, the budget is {budget_s} s",
+                plan.seconds()
+            ),
+        }),
+        None => Ok(plan),
+    }
 }
 
 /// Puts the poses of sweeps in the order of least motion, between what every run needs.
@@ -91,7 +103,7 @@ fn lay(
         overhead_s: mechanics.warm_up_s,
         open: false,
     };
-    check(&plan, mechanics, start.pose)?;
+    check(&plan.steps, mechanics, start.pose)?;
     Ok(plan)
 }
 
@@ -153,12 +165,12 @@ pub fn visits(name: &str, visits: &[Visit], mechanics: &Mechanics) -> Result<Pla
         overhead_s: mechanics.warm_up_s,
         open: false,
     };
-    check(&plan, mechanics, start.pose)?;
+    check(&plan.steps, mechanics, start.pose)?;
     Ok(plan)
 }
 
 /// A plan in the making: its steps, and where the arms stand after them.
-struct Draft<'a> {
+pub(crate) struct Draft<'a> {
     mechanics: &'a Mechanics,
     steps: Vec<Step>,
     standing: Standing,
@@ -184,6 +196,29 @@ impl<'a> Draft<'a> {
         }
     }
 
+    /// What goes on after the steps of a plan, whose first dark readings are among them.
+    pub(crate) fn after(mechanics: &'a Mechanics, standing: Standing, steps: &[Step]) -> Self {
+        let since = |sweep: Sweep| {
+            let later = steps.iter().rev().take_while(|step| step.sweep != sweep);
+            later.map(|step| step.seconds).sum()
+        };
+        Self {
+            dark_sets: 1,
+            since_dark_s: since(Sweep::Dark),
+            since_visit_s: since(Sweep::Reference),
+            ..Self::new(mechanics, standing)
+        }
+    }
+
+    /// The steps as they follow on those of a plan that ends at a pose, checked.
+    pub(crate) fn added(mut self, to: &[Step], from: Pose) -> Result<Vec<Step>, SweepError> {
+        for step in &mut self.steps {
+            step.index += to.len();
+        }
+        check(&self.steps, self.mechanics, from)?;
+        Ok(self.steps)
+    }
+
     /// What is due before the next reading of a sweep.
     fn upkeep(&mut self, job: &str) -> Result<(), SweepError> {
         if self.mechanics.dark_every_s > 0.0 && self.since_dark_s >= self.mechanics.dark_every_s {
@@ -196,7 +231,7 @@ impl<'a> Draft<'a> {
     }
 
     /// A reading at the reference pose, where there is one.
-    fn visit_reference(&mut self, job: &str) -> Result<(), SweepError> {
+    pub(crate) fn visit_reference(&mut self, job: &str) -> Result<(), SweepError> {
         let Some((pose, _)) = self.mechanics.reference else {
             return Ok(());
         };
@@ -248,7 +283,7 @@ impl<'a> Draft<'a> {
     }
 
     /// A sweep along poses; what no safe way leads to is left out.
-    fn sweep(
+    pub(crate) fn sweep(
         &mut self,
         job: &str,
         targets: &mut Targets,
@@ -292,9 +327,9 @@ impl<'a> Draft<'a> {
 }
 
 /// Looks at every leg once more.
-fn check(plan: &Plan, mechanics: &Mechanics, start: Pose) -> Result<(), SweepError> {
+fn check(steps: &[Step], mechanics: &Mechanics, start: Pose) -> Result<(), SweepError> {
     let mut from = start;
-    for step in &plan.steps {
+    for step in steps {
         for &to in &step.path {
             let checked = mechanics.envelope.check_path(from, to);
             checked.map_err(|source| SweepError::Leg {

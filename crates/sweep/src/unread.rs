@@ -4,7 +4,7 @@ use arms::{Arm, Pose};
 use pdv::{Reads, Scene};
 
 use crate::targets::Targets;
-use crate::{Job, LeftOut, Model, Plan, Sweep};
+use crate::{Job, LeftOut, Model, Plan, Step, Sweep};
 
 /// What the scene does not need, in words.
 const WHY: &str = "no value that the scene asks for is made of it";
@@ -23,6 +23,47 @@ pub(crate) fn cut(job: &Job, scene: &Scene, sweeps: &mut [Targets], whole: &Plan
         };
         keep(sweep, &read, whole);
     }
+}
+
+/// Takes out of what is to be added to a plan what no value in the scene would be made of.
+pub(crate) fn cut_added(job: &Job, scene: &Scene, plan: &Plan, added: &mut Targets) {
+    let planned = |sweep: Sweep| {
+        let steps = plan.steps.iter().filter(|step| step.sweep == sweep);
+        let mut poses: Vec<Pose> = steps.map(Step::pose).collect();
+        if sweep == added.sweep {
+            poses.extend(&added.poses);
+        }
+        Targets {
+            sweep,
+            poses,
+            left_out: Vec::new(),
+        }
+    };
+    // An added plane is the next one.
+    let sweeps = (0..=job.planes.len()).map(Sweep::Plane).chain([Sweep::Arc]);
+    let sweeps: Vec<Targets> = sweeps
+        .map(planned)
+        .filter(|sweep| !sweep.poses.is_empty())
+        .collect();
+    let Some(reads) = reads(job.model, scene, &sweeps) else {
+        return;
+    };
+    let planes = sweeps
+        .iter()
+        .filter(|sweep| sweep.sweep != Sweep::Arc)
+        .zip(&reads.planes);
+    let arc = sweeps
+        .iter()
+        .filter(|sweep| sweep.sweep == Sweep::Arc)
+        .zip([&reads.arc]);
+    let read = planes.chain(arc).find(|(sweep, _)| sweep.sweep == added.sweep);
+    let Some((sweep, read)) = read else { return };
+    // Its own come last.
+    let before = sweep.poses.len() - added.poses.len();
+    let mut index = before..;
+    added
+        .poses
+        .retain(|_| index.next().and_then(|i| read.get(i)) == Some(&true));
 }
 
 /// The channels that nobody looks at; the photometer reads all at once, so that it costs nothing to read them.

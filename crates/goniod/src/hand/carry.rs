@@ -107,6 +107,10 @@ impl Hand {
 
     async fn capture(&mut self, run: &str, journal: &mut StoreJournal) -> Result<Captured, DaemonError> {
         let (shared, news) = (self.shared.clone(), self.news.clone());
+        let Some(Record::Header(header)) = journal.records().first() else {
+            return Err(capture::CaptureError::NoHeader.into());
+        };
+        let mut ask = crate::run::ask(Order::resumed(header)?.job, shared.rig.clone());
         let mut observer = Observer::new(shared.clone(), news, run, journal.records());
         let fresh = self.station.is_none();
         self.open()?;
@@ -115,7 +119,8 @@ impl Hand {
         }
         let control = shared.command.subscribe();
         let drive = &mut self.open()?.drive;
-        let outcome = capture::run(drive, journal, control, &mut |event| observer.see(event)).await;
+        let mut on_event = |event| observer.see(event);
+        let outcome = capture::run_and_ask(drive, journal, control, &mut on_event, &mut ask).await;
         shared.view.send_modify(|view| view.lamp = false);
         Ok((outcome?, observer.fault))
     }

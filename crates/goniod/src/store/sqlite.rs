@@ -232,6 +232,16 @@ impl Store for Sqlite {
             Record::Reading(reading) => Some(reading),
             _ => None,
         };
+        let recorded = || failed("record a reading");
+        let mut transaction = self.writer.begin().await.map_err(recorded())?;
+        if let Record::Extension(extension) = record {
+            sqlx::query("UPDATE runs SET planned = planned + $1 WHERE id = $2")
+                .bind(extension.steps.len() as i64)
+                .bind(run)
+                .execute(&mut *transaction)
+                .await
+                .map_err(recorded())?;
+        }
         sqlx::query(
             "INSERT INTO records (run, seq, kind, step, attempt, accepted, body) VALUES ($1, $2, $3, $4, $5, $6, $7)",
         )
@@ -242,10 +252,10 @@ impl Store for Sqlite {
         .bind(reading.map(|reading| i64::from(reading.attempt)))
         .bind(reading.map(|reading| i64::from(reading.accepted)))
         .bind(json(record))
-        .execute(&self.writer)
+        .execute(&mut *transaction)
         .await
-        .map_err(failed("record a reading"))?;
-        Ok(())
+        .map_err(recorded())?;
+        transaction.commit().await.map_err(recorded())
     }
 
     async fn records(&self, run: &str) -> Result<Vec<Record>, StoreError> {

@@ -3,6 +3,7 @@
 // The exemption for tests does not reach what they share.
 #![allow(clippy::unwrap_used)]
 
+mod adaptive;
 mod bench;
 mod faults;
 mod jobs;

@@ -59,6 +59,7 @@ prop_compose! {
             arc: arc.map(|(readings, offset)| Arc { readings, offset: if mirror { 0.0 } else { offset } }),
             model: Model::Separable,
             scene: None,
+            until: None,
         }
     }
 }

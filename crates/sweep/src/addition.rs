@@ -1,0 +1,122 @@
+use arms::{Arm, ArmAngle, Pose};
+use pdv::Distribution;
+
+use crate::order::order;
+use crate::planner::Draft;
+use crate::reach::Reach;
+use crate::route::Standing;
+use crate::targets::{Targets, plane};
+use crate::{Job, Mechanics, Plan, Plane, Step, Sweep, SweepError, unread};
+
+/// What may be added to a plan while it runs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Addition {
+    /// A plane at a new θ_r, rad, with the readings and the distribution of the job's first plane.
+    Plane(f64),
+    /// A reading between any two neighbours of a plane, by its index, or of the arc.
+    Between(Sweep),
+}
+
+/// Plans an addition from where a plan ends: its steps, whose indices go on from the plan's. Empty where no new pose can
+/// be measured.
+///
+/// # Errors
+/// As [`crate::plan`].
+pub fn add(
+    job: &Job,
+    plan: &Plan,
+    addition: Addition,
+    mechanics: &Mechanics,
+) -> Result<Vec<Step>, SweepError> {
+    let Some(last) = plan.steps.last() else {
+        return Ok(Vec::new());
+    };
+    let standing = Standing {
+        pose: last.pose(),
+        approached: true,
+    };
+    let reach = Reach::new(mechanics, Some(standing.pose));
+    let mut targets = match addition {
+        Addition::Plane(theta_r) => {
+            let grown = job.grown(plan).with_plane(theta_r);
+            plane(&grown, grown.planes.len() - 1, reach)?
+        }
+        Addition::Between(sweep) => between(plan, sweep, reach),
+    };
+    if let Some(scene) = &job.scene {
+        unread::cut_added(&job.grown(plan), scene, plan, &mut targets);
+    }
+    if targets.poses.is_empty() {
+        return Ok(Vec::new());
+    }
+    let poses = targets.poses.clone();
+    let backwards = order(mechanics, Some(standing), std::slice::from_ref(&poses))[0].1;
+    let mut draft = Draft::after(mechanics, standing, &plan.steps);
+    let along = (0..poses.len()).map(|i| poses[if backwards { poses.len() - 1 - i } else { i }]);
+    draft.sweep(&job.name, &mut targets, along)?;
+    draft.visit_reference(&job.name)?;
+    draft.added(&plan.steps, standing.pose)
+}
+
+/// Poses half-way between those that a plan has in a sweep.
+fn between(plan: &Plan, sweep: Sweep, reach: Reach<'_>) -> Targets {
+    let mechanics = reach.mechanics;
+    // What the sweep moves: along the arc both arms, of which the sensor counts.
+    let arm = if sweep == Sweep::Arc {
+        Arm::Sensor
+    } else {
+        Arm::Light
+    };
+    let mut known: Vec<Pose> = plan
+        .steps
+        .iter()
+        .filter(|step| step.sweep == sweep)
+        .map(Step::pose)
+        .collect();
+    known.sort_by(|a, b| a.angle(arm).rad().total_cmp(&b.angle(arm).rad()));
+    known.dedup();
+    let middle = |pair: &[Pose]| {
+        Arm::BOTH.into_iter().fold(pair[0], |pose, arm| {
+            let [a, b] = [pair[0], pair[1]].map(|pose| pose.angle(arm).rad());
+            pose.with(arm, mechanics.nearest(arm, ArmAngle::from_rad(0.5 * (a + b))))
+        })
+    };
+    let poses = known
+        .windows(2)
+        .map(middle)
+        .filter(|pose| !known.contains(pose) && reach.check(*pose).is_ok());
+    Targets {
+        sweep,
+        poses: poses.collect(),
+        left_out: Vec::new(),
+    }
+}
+
+impl Job {
+    /// The job with the planes that were added to its plan while it ran, in the order of their indices.
+    #[must_use]
+    pub fn grown(&self, plan: &Plan) -> Self {
+        let mut grown = self.clone();
+        while let Some(step) = plan
+            .steps
+            .iter()
+            .find(|step| step.sweep == Sweep::Plane(grown.planes.len()))
+        {
+            grown = grown.with_plane(step.pose().sensor.rad().abs());
+        }
+        grown
+    }
+
+    /// With one plane more, whose readings are those of the first.
+    fn with_plane(mut self, theta_r: f64) -> Self {
+        let (readings, distribution) = self.planes.first().map_or((1, Distribution::Lobe), |plane| {
+            (plane.readings, plane.distribution)
+        });
+        self.planes.push(Plane {
+            theta_r,
+            readings,
+            distribution,
+        });
+        self
+    }
+}
