@@ -148,7 +148,7 @@ impl Signs {
 }
 
 /// Weights of [`Signs::terms`].
-const WEIGHTS: [f64; 8] = [-2.1645, 0.1959, 0.0626, 0.3144, -0.0521, -0.0294, 0.2058, -0.7838];
+const WEIGHTS: [f64; 8] = [-2.2299, 0.0723, 0.3044, 0.3010, -0.0776, 0.0028, 0.0338, -0.0968];
 
 /// Pairs of the scene, and the channels that count.
 struct Over {
