@@ -5,13 +5,16 @@ use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
+use axum::Router;
+use axum::http::Request;
 use axum::serve::ListenerExt;
-use axum::{Extension, Router};
+use hyper::body::Incoming;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::server::graceful::GracefulShutdown;
 use hyper_util::service::TowerToHyperService;
 use tokio::sync::{Semaphore, watch};
+use tower::ServiceExt;
 
 use super::access::Access;
 use super::listener::Listener;
@@ -129,7 +132,12 @@ async fn accept<L: axum::serve::Listener>(
             tracing::warn!(%peer, "refused: {} connections are open already", limits.connections);
             continue;
         };
-        let service = TowerToHyperService::new(app.clone().layer(Extension(peer)));
+        // A layer would make every route anew, more than a megabyte for each connection.
+        let app = app.clone().map_request(move |mut request: Request<Incoming>| {
+            request.extensions_mut().insert(peer.clone());
+            request
+        });
+        let service = TowerToHyperService::new(app);
         let connection = graceful.watch(server.serve_connection(TokioIo::new(io), service));
         tokio::spawn(async move {
             let _slot = slot;

@@ -3,6 +3,7 @@
 use std::num::NonZeroU32;
 
 use goniod::http::Limits;
+use tokio::net::TcpStream;
 
 use crate::service::Service;
 
@@ -84,4 +85,28 @@ async fn streams_end_with_the_daemon() {
     let mut watch = service.watch("").await;
     service.end().await;
     while watch.next().await.is_some() {}
+}
+
+/// Resident memory of this process, bytes (proc(5), statm), for pages of at least 4096.
+fn resident() -> usize {
+    let statm = std::fs::read_to_string("/proc/self/statm").unwrap();
+    let pages: usize = statm.split(' ').nth(1).unwrap().parse().unwrap();
+    pages * 4096
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_connection_costs_little_memory() {
+    let service = Service::start().await;
+    assert_eq!(service.get("/health").await.status, 200);
+    let before = resident();
+    let mut open = Vec::new();
+    for _ in 0..300 {
+        open.push(TcpStream::connect(service.address).await.unwrap());
+    }
+    // They are accepted in turn, so those are by now.
+    assert_eq!(service.get("/health").await.status, 200);
+    let each = resident().saturating_sub(before) / open.len();
+    // Far more than one needs, because other tests run in this process too.
+    assert!(each < 400_000, "{each} bytes for each connection");
+    service.end().await;
 }
