@@ -1,31 +1,43 @@
 #!/usr/bin/env python3
-"""Measures the daemon from outside: idle, and under load. Needs python3 alone.
+"""Measures the daemon from outside. Needs python3 alone.
 
-  cargo build --release -p goniod
+  cargo build --release -p goniod -p firmware-sim
   .ci/service/measure.py target/release/goniod idle    memory, processor time, time to the first answer
-  .ci/service/measure.py target/release/goniod load    50 watchers and 200 requests a second for a minute
+  .ci/service/measure.py target/release/goniod load    readings a second while 50 watch and 200 requests a second come
+  .ci/service/measure.py target/release/goniod stop    emergency stops under that load: acknowledged, and on the wire
+  .ci/service/measure.py target/release/goniod night   memory over a thousand runs in simulated time
 
-Both end with an error where what docs/http.md promises does not hold. On a machine that is busy otherwise, times say
-little.
+Each ends with an error where what docs/http.md promises does not hold. On a machine that is busy otherwise, times say
+little; what else it did is printed beside them.
 """
 
 import asyncio
+import contextlib
 import json
+import multiprocessing
 import os
+import pty
+import random
+import select
+import shutil
 import signal
 import statistics
 import subprocess
 import sys
 import tempfile
 import time
+import tty
 from pathlib import Path
 
 WATCHERS = 50
 REQUESTS_PER_S = 200
 LOAD_S = 60
 CALM_S = 20
-PRESSES = 200
+PRESSES = 40
 IDLE_S = 30
+RUNS = 1000
+# Runs after which memory should have found its level.
+SETTLED = 100
 
 JOB = """specimen = "load"
 on_stage = true
@@ -38,17 +50,26 @@ theta_r_deg = 40
 readings = 2000
 distribution = "uniform"
 """
+SHORT_JOB = """specimen = "night"
+on_stage = true
+[[plane]]
+theta_r_deg = 60
+readings = 12
+[arc]
+readings = 8
+"""
 
 
 class Daemon:
-    """A daemon on a free port, with the simulated rig in real time."""
+    """A daemon on a free port, with a rig."""
 
-    def __init__(self, program, folder):
-        rig = Path(folder, "rig.toml")
-        rig.write_text('[sim]\nclock = "real"\n')
+    def __init__(self, program, folder, rig):
+        self.data = Path(folder, "data")
+        file = Path(folder, "rig.toml")
+        file.write_text(rig)
         begun = time.monotonic()
         self.process = subprocess.Popen(
-            [program, "--config", rig, "--data", Path(folder, "runs"), "--listen", "127.0.0.1:0"],
+            [program, "--config", file, "--data", self.data, "--listen", "127.0.0.1:0"],
             stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=os.environ | {"RUST_LOG": "warn"}, text=True)
         address = self.process.stdout.readline().strip()
         self.host, port = address.removeprefix("http://").split(":")
@@ -79,6 +100,16 @@ class Daemon:
         head, _, body = answer.partition(b"\r\n\r\n")
         return int(head.split()[1]), body
 
+    async def read(self, path):
+        status, body = await self.ask("GET", path)
+        assert status == 200, (path, status, body)
+        return json.loads(body)
+
+    async def submit(self, job):
+        status, body = await self.ask("POST", "/api/v1/jobs?name=measure.toml", job)
+        assert status == 201, (status, body)
+        return json.loads(body)["id"]
+
     async def events(self):
         """What happens, for as long as somebody asks for more."""
         reader, writer = await asyncio.open_connection(self.host, self.port)
@@ -108,82 +139,205 @@ def idle(daemon):
     ])
 
 
+async def readings(daemon):
+    return ((await daemon.read("/api/v1/rig"))["progress"] or {"done": 0})["done"]
+
+
 async def rate(daemon, seconds):
-    """Readings a second of the run under way, by the photometer's own clock and by ours."""
-    async def done():
-        return json.loads((await daemon.ask("GET", "/api/v1/rig"))[1])["progress"]["done"]
-    first, begun = await done(), time.monotonic()
+    """Readings a second of the run under way."""
+    first, begun = await readings(daemon), time.monotonic()
     await asyncio.sleep(seconds)
-    return (await done() - first) / (time.monotonic() - begun)
+    return (await readings(daemon) - first) / (time.monotonic() - begun)
 
 
-async def load(daemon):
-    status, body = await daemon.ask("POST", "/api/v1/jobs?name=load.toml", JOB)
-    assert status == 201, body
-    while (json.loads((await daemon.ask("GET", "/api/v1/rig"))[1])["progress"] or {"done": 0})["done"] < 10:
-        await asyncio.sleep(0.2)
-    calm = await rate(daemon, CALM_S)
-    memory = daemon.memory_mb()
+@contextlib.asynccontextmanager
+async def burden(daemon):
+    """Watchers and requests, as many as are to be borne, and what became of them."""
+    seen, answered = [0] * WATCHERS, []
 
-    seen = [0] * WATCHERS
     async def watch(i):
         async for _ in daemon.events():
             seen[i] += 1
-    answered = []
+
+    async def one(path):
+        begun = time.monotonic()
+        status, _ = await daemon.ask("GET", path)
+        answered.append((status, time.monotonic() - begun))
+
     async def press_on():
         paths = ["/api/v1/rig", "/api/v1/jobs", "/api/v1/runs", "/metrics", "/", "/health"]
-        pending, due, count = set(), time.monotonic(), 0
-        while True:
-            async def one(path):
-                begun = time.monotonic()
-                status, _ = await daemon.ask("GET", path)
-                answered.append((status, time.monotonic() - begun))
-            task = asyncio.create_task(one(paths[count % len(paths)]))
-            pending.add(task)
-            task.add_done_callback(pending.discard)
-            count += 1
-            due += 1 / REQUESTS_PER_S
-            await asyncio.sleep(max(0, due - time.monotonic()))
-    burden = [asyncio.create_task(watch(i)) for i in range(WATCHERS)] + [asyncio.create_task(press_on())]
-    loaded = await rate(daemon, LOAD_S)
-    asked = len(answered)
+        due, count = time.monotonic(), 0
+        async with asyncio.TaskGroup() as group:
+            while True:
+                group.create_task(one(paths[count % len(paths)]))
+                count += 1
+                due += 1 / REQUESTS_PER_S
+                await asyncio.sleep(max(0, due - time.monotonic()))
 
-    presses = []
-    for _ in range(PRESSES):
-        begun = time.monotonic()
-        status, _ = await daemon.ask("POST", "/api/v1/estop")
-        presses.append((time.monotonic() - begun) * 1e3)
-        assert status == 204
-        await asyncio.sleep(0.02)
-        # Acknowledging may come before the fault is noted; pressing again needs none.
-        await daemon.ask("POST", "/api/v1/acknowledge")
-    for task in burden:
+    begun = time.monotonic()
+    tasks = [asyncio.create_task(watch(i)) for i in range(WATCHERS)] + [asyncio.create_task(press_on())]
+    yield answered
+    lasted = time.monotonic() - begun
+    for task in tasks:
         task.cancel()
-    refused = sum(status != 200 for status, _ in answered)
+    await asyncio.gather(*tasks, return_exceptions=True)
     times = sorted(seconds for _, seconds in answered)
-    print(f"{asked} requests in {LOAD_S} s, {refused} not answered with 200; "
-          f"median {statistics.median(times) * 1e3:.1f} ms, p99 {times[len(times) * 99 // 100] * 1e3:.1f} ms; "
-          f"{sum(seen)} events to {WATCHERS} watchers")
-    print(f"readings a second: {calm:.2f} alone, {loaded:.2f} under load")
+    refused = sum(status != 200 for status, _ in answered)
+    print(f"{len(times) / lasted:.0f} requests a second for {lasted:.0f} s, {refused} not answered with 200; "
+          f"median {statistics.median(times) * 1e3:.1f} ms, p99 {p99(times) * 1e3:.1f} ms; "
+          f"{sum(seen)} events to {WATCHERS} watchers; load average {os.getloadavg()[0]:.1f}")
+
+
+def p99(values):
+    return sorted(values)[len(values) * 99 // 100]
+
+
+async def load(daemon):
+    await daemon.submit(JOB)
+    while await readings(daemon) < 10:
+        await asyncio.sleep(0.2)
+    before = await rate(daemon, CALM_S)
+    memory = daemon.memory_mb()
+    async with burden(daemon) as answered:
+        loaded = await rate(daemon, LOAD_S)
+        gained = daemon.memory_mb() - memory
+    after = await rate(daemon, CALM_S)
+    await daemon.ask("POST", "/api/v1/stop")
+    calm = (before + after) / 2
+    print(f"readings a second: {before:.2f} before, {loaded:.2f} under load, {after:.2f} after")
     return all([
-        refused == 0,
+        all(status == 200 for status, _ in answered),
         check("readings lost to load", (1 - loaded / calm) * 100, "%", 5),
-        check("emergency stop acknowledged, p99", sorted(presses)[PRESSES * 99 // 100], "ms", 50),
-        check("memory gained under load", daemon.memory_mb() - memory, "MB", 20),
+        check("memory gained under load", gained, "MB", 20),
     ])
+
+
+def tap(bus, told):
+    """Sits on the wire between the daemon and a simulated bus and tells when both servos have an emergency stop: their
+    profile off, then a goal."""
+    profile_off = bytes([0x03, 108, 0]) + bytes(8)
+    goal = bytes([0x03, 116, 0])
+    device = os.open(bus, os.O_RDWR | os.O_NOCTTY)
+    host, other = pty.openpty()
+    for terminal in (device, host, other):
+        tty.setraw(terminal)
+    told.send(os.ttyname(other))
+    kept, stopping, stopped = b"", set(), set()
+    while True:
+        ready, _, _ = select.select([host, device], [], [])
+        if device in ready:
+            os.write(host, os.read(device, 4096))
+        if host not in ready:
+            continue
+        data = os.read(host, 4096)
+        os.write(device, data)
+        # Protocol 2.0: header, id, length, instruction, parameters, CRC.
+        *packets, kept = (kept + data).split(b"\xff\xff\xfd\x00")
+        if len(kept) > 3 and len(kept) >= 3 + int.from_bytes(kept[1:3], "little"):
+            packets, kept = packets + [kept], b""
+        for packet in packets:
+            servo, instruction = packet[:1], packet[3:-2]
+            if instruction == profile_off:
+                stopping.add(servo)
+            elif servo in stopping and instruction[:3] == goal:
+                stopped.add(servo)
+            if len(stopped) == 2:
+                told.send(time.monotonic())
+                stopping, stopped = set(), set()
+
+
+async def stop(daemon, told):
+    """Presses the emergency stop again and again while the arms move, and goes on each time."""
+    job = await daemon.submit(JOB)
+    acknowledged, stopped = [], []
+    async with burden(daemon):
+        for _ in range(PRESSES):
+            done = await readings(daemon)
+            while await readings(daemon) <= done:
+                await asyncio.sleep(0.05)
+            await asyncio.sleep(random.uniform(0, 0.3))
+            # A stop may be told more than once, since whoever watches the rig repeats it.
+            while told.poll():
+                told.recv()
+            begun = time.monotonic()
+            status, body = await daemon.ask("POST", "/api/v1/estop")
+            assert status == 204, (status, body)
+            acknowledged.append((time.monotonic() - begun) * 1e3)
+            assert await asyncio.to_thread(told.poll, 5), "no stop on the wire"
+            stopped.append((told.recv() - begun) * 1e3)
+            for path in ["/api/v1/acknowledge", f"/api/v1/jobs/{job}/resume"]:
+                while (answer := await daemon.ask("POST", path))[0] not in (200, 204):
+                    # The arms come to rest first, and what was measured is reported.
+                    assert answer[0] == 409, answer
+                    await asyncio.sleep(0.1)
+    await daemon.ask("POST", "/api/v1/stop")
+    for what, times in [("acknowledged", acknowledged), ("on the wire", stopped)]:
+        print(f"{what} after {statistics.median(times):.1f} ms in the median of {PRESSES} presses, at most {max(times):.1f} ms")
+    return all([
+        check("emergency stop acknowledged, p99", p99(acknowledged), "ms", 50),
+        check("both servos have it, p99", p99(stopped), "ms", 100),
+    ])
+
+
+async def night(daemon):
+    """Short runs one after the other; their directories are removed, or they would fill the disk."""
+    submitted, removed, levels, begun = 0, set(), [], time.monotonic()
+    while len(removed) < RUNS:
+        while submitted < min(RUNS, len(removed) + 20):
+            await daemon.submit(SHORT_JOB)
+            submitted += 1
+        for run in await daemon.read("/api/v1/runs"):
+            if run["reported"] and run["id"] not in removed:
+                assert run["accepted"] == run["planned"], run
+                shutil.rmtree(run["directory"])
+                removed.add(run["id"])
+                if len(removed) % SETTLED == 0:
+                    levels.append(daemon.memory_mb())
+                    print(f"{len(removed)} runs, {time.monotonic() - begun:.0f} s: {levels[-1]:.1f} MB", flush=True)
+        await asyncio.sleep(0.2)
+    return check("memory gained since it settled", levels[-1] - levels[0], "MB", 20)
+
+
+@contextlib.contextmanager
+def tapped_bus(program):
+    """A simulated bus in real time behind a tap: the port, and where the tap tells what it saw."""
+    bus = subprocess.Popen([Path(program).with_name("firmware-sim")], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    ours, theirs = multiprocessing.Pipe()
+    wire = multiprocessing.Process(target=tap, args=(bus.stdout.readline().strip(), theirs))
+    wire.start()
+    try:
+        yield ours.recv(), ours
+    finally:
+        wire.terminate()
+        bus.terminate()
+        bus.wait()
+
+
+def measure(program, what, folder, stack):
+    if what == "stop":
+        port, told = stack.enter_context(tapped_bus(program))
+        rig = f'[bus]\nport = "{port}"\n'
+    else:
+        rig = f'[sim]\nclock = "{"wire" if what == "night" else "real"}"\n'
+    daemon = Daemon(program, folder, rig)
+    try:
+        good = {
+            "idle": lambda: idle(daemon),
+            "load": lambda: asyncio.run(load(daemon)),
+            "stop": lambda: asyncio.run(stop(daemon, told)),
+            "night": lambda: asyncio.run(night(daemon)),
+        }[what]()
+    finally:
+        ended = daemon.end()
+    if ended != 0:
+        print(f"it ended with {ended} on SIGTERM")
+    return good and ended == 0
 
 
 def main():
     program, what = sys.argv[1:]
-    with tempfile.TemporaryDirectory() as folder:
-        daemon = Daemon(program, folder)
-        try:
-            good = idle(daemon) if what == "idle" else asyncio.run(load(daemon))
-        finally:
-            ended = daemon.end()
-    if ended != 0:
-        print(f"it ended with {ended} on SIGTERM")
-    sys.exit(0 if good and ended == 0 else 1)
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
+        sys.exit(0 if measure(program, what, folder, stack) else 1)
 
 
 if __name__ == "__main__":
