@@ -77,7 +77,7 @@ impl Expectation {
         let sweeps = Sweeps::new(planes, arc)?;
         let (surface, sides) = crate::choice::choose(&sweeps)?;
         let over = Over::new(scene);
-        let whole = over.logs(&surface, |surface, pair| surface.reflectance(pair));
+        let whole = over.logs(&surface, Surface::reflectance);
         let form = over.change(
             &whole,
             &over.logs(&surface, |surface, pair| surface.at(pair.bisected(), None)),
@@ -148,7 +148,7 @@ impl Signs {
 }
 
 /// Weights of [`Signs::terms`].
-const WEIGHTS: [f64; 8] = [-2.2299, 0.0723, 0.3044, 0.3010, -0.0776, 0.0028, 0.0338, -0.0968];
+const WEIGHTS: [f64; 8] = [-2.2299, 0.0723, 0.3044, 0.3009, -0.0776, 0.0028, 0.0338, -0.0968];
 
 /// Pairs of the scene, and the channels that count.
 struct Over {
@@ -213,10 +213,7 @@ impl Over {
     ) -> f64 {
         let surface = Sweeps::new(planes, arc).and_then(|sweeps| Surface::new(&sweeps, shape));
         surface.map_or(0.0, |surface| {
-            self.change(
-                whole,
-                &self.logs(&surface, |surface, pair| surface.reflectance(pair)),
-            )
+            self.change(whole, &self.logs(&surface, Surface::reflectance))
         })
     }
 }

@@ -56,7 +56,7 @@ fn case(material: usize, brdf: &Fitted, job: &Job) -> Result<Case, Failed> {
         rig_s,
         adapted,
         ..
-    } = measure(job, &rig, Arc::new(brdf.clone()))?;
+    } = measure(job, &rig, Arc::new(*brdf))?;
     let expected = Expectation::new(&planes, &arc, None)?;
     let model = report::model(job.model, &planes, &arc)?;
     let draw = Draw {

@@ -42,7 +42,7 @@ fn below_60_degrees_less_time_buys_the_same_error() {
             let material = Fitted::named(name).expect("a fitted material");
             let found = ["", SCENE].map(|scene| {
                 let job = job(planes_deg, 32, scene);
-                let measured = measure(&job, &rig, Arc::new(material.clone())).expect("the rig can do it");
+                let measured = measure(&job, &rig, Arc::new(material)).expect("the rig can do it");
                 let model =
                     report::model(job.model, &measured.planes, &measured.arc).expect("enough readings");
                 (measured.rig_s, model)

@@ -7,7 +7,7 @@ const PLANES: &str = "[[plane]]\ntheta_r_deg = 20\nreadings = 60\n[[plane]]\nthe
 
 fn planned(model: Model, scene: &str) -> Plan {
     let text = format!("{PLANES}[reconstruction]\nmodel = \"{}\"\n{scene}", model.name());
-    plan(&job(&text), &mechanics()).unwrap()
+    plan(&job(&text), &mechanics()).expect("the rig can do it")
 }
 
 fn sweeps() -> impl Iterator<Item = Sweep> {
