@@ -1,9 +1,7 @@
-use std::collections::BTreeMap;
-
 use rig::RigFile;
 use serde::Deserialize;
 
-use crate::{Fault, Mishap, Server, SimError, WireSettings};
+use crate::{Fault, Server, SimError, WireSettings};
 
 /// What a running simulator is told to do: a line of TOML, as `firmware-sim --orders` reads them from stdin.
 ///
@@ -15,7 +13,7 @@ use crate::{Fault, Mishap, Server, SimError, WireSettings};
 pub struct Order {
     fault: Option<Fault>,
     wire: toml::Table,
-    mishaps: BTreeMap<Mishap, f64>,
+    mishaps: toml::Table,
     plugged: Option<bool>,
 }
 
@@ -37,11 +35,7 @@ impl Order {
     pub fn carry_out(self, rig: &mut RigFile, server: &mut Server) -> Result<(), SimError> {
         let mut changed = rig.clone();
         merge(&mut changed.sim, "wire", self.wire);
-        let mishaps = self.mishaps.into_iter().map(|(kind, rate)| {
-            let key = toml::Value::try_from(kind).expect("its name is a string");
-            (key.as_str().unwrap_or_default().to_owned(), rate.into())
-        });
-        merge(&mut changed.sim, "mishaps", mishaps.collect());
+        merge(&mut changed.sim, "mishaps", self.mishaps);
         let wire = WireSettings::new(&changed)?;
         let mishaps = crate::Settings::new(&changed)?.mishaps;
         let same = changed.sim.get("mishaps") == rig.sim.get("mishaps");

@@ -6,7 +6,9 @@ use study::{Campaign, Wrong};
 
 /// A fresh seed each time: what it finds is printed as a script for `gonioctl campaign --replay`.
 fn campaign(captures: u64, over_wire: bool) {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();
+    let since = SystemTime::now()
+        .duration_since(UNIX_EPOCH)
+        .expect("a clock after 1970");
     let seed = since.as_micros() as u64 % 1_000_000_000;
     println!("seed {seed}");
     let campaigned = Campaign {

@@ -65,9 +65,9 @@ impl Bench for OverWire {
         // Gives the port up.
         drop(rig);
         self.server.bench(|bench| {
-            DEVICES
-                .into_iter()
-                .for_each(|device| bench.device(device).reboot())
+            for device in DEVICES {
+                bench.device(device).reboot();
+            }
         });
         self.server.plug_in().map_err(words)?;
         let rig = Dynamixel::open(self.server.path(), file).map_err(words)?;
