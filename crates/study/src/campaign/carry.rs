@@ -70,9 +70,9 @@ async fn carry_out<B: Bench>(script: &Script) -> Result<Carried, String> {
     let specimen = brdf::specimen(SPECIMEN).map_err(words)?;
     let (mut bench, rig) = B::new(script, &file)?;
     let mut drive = Drive::new(rig, file.clone());
-    let start = drive.snapshot().await.map_err(words)?.pose();
     let job = Job::parse(JOB, "campaign").map_err(words)?;
-    let plan = sweep::plan(&job, &capture::mechanics(&file, Some(start))).map_err(words)?;
+    // Where the simulator's arms stand when power comes on; to look would be to meet the faults before the capture.
+    let plan = sweep::plan(&job, &capture::mechanics(&file, Some(file.motion.park))).map_err(words)?;
     let steps = plan.steps.len();
     let mut journal = MemoryJournal(vec![Record::Header(Header {
         run: script.seed.to_string(),
