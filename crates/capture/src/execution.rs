@@ -1,5 +1,6 @@
 use std::time::{Duration, SystemTime};
 
+use arms::Pose;
 use rig::{Counts, Drive, Exposure, Gain, Identity, Lamp, Rig, RigFile};
 use sweep::{Plan, Step, Sweep};
 use tokio::sync::watch;
@@ -10,6 +11,7 @@ use crate::progress::Progress;
 use crate::run::Ask;
 use crate::{CaptureError, Command, Event, Flag, Journal, Reading, Record, State, closed, mechanics};
 
+mod fly;
 mod shutdown;
 mod suspend;
 
@@ -52,8 +54,10 @@ pub(crate) struct Execution<'a, R: Rig> {
     judged: Option<u64>,
     /// Whether a device was told anything: until each has said who it is, none is.
     touched: bool,
-    /// Whether the arms stand where the plan left them, so that a step's own path leads on.
-    on_path: bool,
+    /// Where the plan left the arms, so that a step's own path leads on.
+    standing: Option<Pose>,
+    /// Readings of a flight that has not landed.
+    aloft: Vec<Reading>,
 }
 
 impl<'a, R: Rig> Execution<'a, R> {
@@ -100,7 +104,8 @@ impl<'a, R: Rig> Execution<'a, R> {
             lamp_exposure: None,
             judged: None,
             touched: false,
-            on_path: false,
+            standing: None,
+            aloft: Vec::new(),
         }
     }
 
@@ -120,20 +125,52 @@ impl<'a, R: Rig> Execution<'a, R> {
         }
         let mut next = 0;
         loop {
+            let first = next;
             while let Some(step) = self.plan.steps.get(next).cloned() {
                 next += 1;
+                if let Some(pass) = step.pass {
+                    let ends = self.plan.steps[step.index..]
+                        .iter()
+                        .position(|later| later.pass != step.pass);
+                    next = ends.map_or(self.plan.steps.len(), |steps| step.index + steps);
+                    if self.torn(step.index..next) {
+                        self.pass(pass).await?;
+                    }
+                    continue;
+                }
                 if self.done[step.index] {
-                    self.on_path = false;
+                    self.standing = None;
                     continue;
                 }
                 self.obey().await?;
                 self.suspend().await?;
                 self.step(&step).await?;
             }
+            self.make_up(first..next).await?;
             if !self.extend().await? {
                 return Ok(());
             }
         }
+    }
+
+    /// Takes at rest what flights left undone.
+    async fn make_up(&mut self, steps: std::ops::Range<usize>) -> Result<(), Interrupt<R::Error>> {
+        for index in steps {
+            if self.done[index] {
+                continue;
+            }
+            let step = self.plan.steps[index].clone();
+            // Its own path leads from its neighbour in the pass.
+            self.standing = self.standing.filter(|&pose| pose == step.pose());
+            self.obey().await?;
+            self.step(&step).await?;
+        }
+        Ok(())
+    }
+
+    /// Whether a flight over these steps has not been recorded whole: every step that it read was tried at least once.
+    fn torn(&self, steps: std::ops::Range<usize>) -> bool {
+        steps.into_iter().any(|i| !self.done[i] && self.attempts[i] == 0)
     }
 
     /// Asks what else is to be measured, looking after the rig meanwhile, and records the answer. Returns whether
@@ -189,7 +226,10 @@ impl<'a, R: Rig> Execution<'a, R> {
         };
         self.switch_lamp(true).await?;
         let retries = self.drive.retries();
-        let measured = self.travel_anew(before.goal).await?;
+        // In flight a reading is not taken at its step's pose itself.
+        let taken = self.file.nearest(before.measured);
+        let there = before.swept_rad.is_some() && self.file.envelope.check_pose(taken).is_ok();
+        let measured = self.travel_anew(if there { taken } else { before.goal }).await?;
         let counts = self.drive.expose(before.counts.exposure).await?;
         if self.lamp_is_out(&counts) {
             return Err(Interrupt::Lamp);
@@ -197,6 +237,7 @@ impl<'a, R: Rig> Execution<'a, R> {
         let mut reading = Reading {
             accepted: false,
             sweep: Sweep::Repeat,
+            swept_rad: None,
             measured,
             counts,
             device_ticks: self.clock.unwrap(counts.ticks),
@@ -260,6 +301,7 @@ impl<'a, R: Rig> Execution<'a, R> {
                 device_ticks: self.clock.unwrap(counts.ticks),
                 retries: self.drive.retries() - retries,
                 flags: Vec::new(),
+                swept_rad: None,
             };
             reading.flags = self.flags(&reading);
             retries = self.drive.retries();
@@ -273,18 +315,17 @@ impl<'a, R: Rig> Execution<'a, R> {
     }
 
     /// Drives to a step's pose; from wherever the arms are where its own path does not lead on.
-    async fn travel(&mut self, step: &Step) -> Result<arms::Pose, Interrupt<R::Error>> {
-        let measured = if self.on_path {
-            self.drive.travel(&step.path).await?.pose()
-        } else {
-            self.travel_anew(step.pose()).await?
+    async fn travel(&mut self, step: &Step) -> Result<Pose, Interrupt<R::Error>> {
+        let measured = match self.standing {
+            Some(_) => self.drive.travel(&step.path).await?.pose(),
+            None => self.travel_anew(step.pose()).await?,
         };
-        self.on_path = true;
+        self.standing = Some(step.pose());
         Ok(measured)
     }
 
     /// Drives to a pose from wherever the arms are.
-    async fn travel_anew(&mut self, to: arms::Pose) -> Result<arms::Pose, Interrupt<R::Error>> {
+    async fn travel_anew(&mut self, to: Pose) -> Result<Pose, Interrupt<R::Error>> {
         let from = self.drive.snapshot().await?.pose();
         let mechanics = mechanics(self.file, Some(from));
         let path = sweep::way(&mechanics, from, to).map_err(Interrupt::Way)?;
@@ -348,20 +389,25 @@ impl<'a, R: Rig> Execution<'a, R> {
     async fn switch_lamp(&mut self, on: bool) -> Result<(), Interrupt<R::Error>> {
         self.drive.lamp(on).await?;
         self.lamp = on;
-        if on {
-            self.state(State::WarmingUp);
-            let mut left = self.file.photometer.lamp_warm_up;
-            while !left.is_zero() {
-                self.obey().await?;
-                let slice = left.min(self.look_every());
-                self.drive.wait(slice).await?;
-                left -= slice;
-                self.look().await?;
-            }
-            self.mark = self.look().await?;
-            self.progress.warm();
-            self.state(State::Running);
+        match on {
+            true => self.warm_up(self.file.photometer.lamp_warm_up).await,
+            false => Ok(()),
         }
+    }
+
+    /// Waits until the lamp, which is on, gives steady light.
+    async fn warm_up(&mut self, mut left: Duration) -> Result<(), Interrupt<R::Error>> {
+        self.state(State::WarmingUp);
+        while !left.is_zero() {
+            self.obey().await?;
+            let slice = left.min(self.look_every());
+            self.drive.wait(slice).await?;
+            left -= slice;
+            self.look().await?;
+        }
+        self.mark = self.look().await?;
+        self.progress.warm();
+        self.state(State::Running);
         Ok(())
     }
 

@@ -4,6 +4,10 @@ use sweep::Sweep;
 
 use crate::Reading;
 
+mod brief;
+
+pub(crate) use brief::brief;
+
 /// How much brighter than full scale a saturated channel is taken to be.
 const BEYOND_FULL_SCALE: f64 = 8.0;
 /// Most by which the trend of the last two readings may raise a prediction.
@@ -83,7 +87,8 @@ impl<'a> Ranging<'a> {
         f64::from(counts.rgb.into_iter().fold(0, u32::max)) - self.dark_level(counts.exposure)
     }
 
-    fn rate(&self, counts: &Counts) -> f64 {
+    /// Counts per µs at gain ×1.
+    pub(crate) fn rate(&self, counts: &Counts) -> f64 {
         let net = if counts.saturated {
             f64::from(self.photometer.full_scale) * BEYOND_FULL_SCALE
         } else {
@@ -106,10 +111,10 @@ impl<'a> Ranging<'a> {
         levels.iter().sum::<f64>() / levels.len().max(1) as f64
     }
 
-    /// Expected rate at a pose: of the last reading of the sweep, raised along the trend of the last two (an
-    /// exposure that comes out too weak costs little, a saturated one must be repeated); failing that, of the nearest
-    /// reading of any sweep.
-    fn predict(&self, sweep: Sweep, pose: Pose) -> Option<f64> {
+    /// Expected rate at a pose: between two readings of the sweep, evenly in the logarithm; beyond them of the last one,
+    /// raised along the trend of the last two (an exposure that comes out too weak costs little, a saturated one must be
+    /// repeated); failing that, of the nearest reading of any sweep.
+    pub(crate) fn predict(&self, sweep: Sweep, pose: Pose) -> Option<f64> {
         let mut last = self.lit.iter().rev().filter(|(of, ..)| *of == sweep);
         let Some(&(_, last_pose, last_rate)) = last.next() else {
             let distance = |at: &Pose| (at.light - pose.light).abs() + (at.sensor - pose.sensor).abs();
@@ -119,6 +124,9 @@ impl<'a> Ranging<'a> {
                 .min_by(|(_, a, _), (_, b, _)| distance(a).total_cmp(&distance(b)));
             return nearest.map(|&(.., rate)| rate);
         };
+        if let Some(rate) = self.between(sweep, pose) {
+            return Some(rate);
+        }
         let Some(&(_, before, rate_before)) = last.next() else {
             return Some(last_rate);
         };
@@ -130,6 +138,22 @@ impl<'a> Ranging<'a> {
             0.0
         };
         Some(last_rate * growth.exp())
+    }
+
+    /// The rate between the two nearest readings of a sweep, where it has some on both sides.
+    fn between(&self, sweep: Sweep, pose: Pose) -> Option<f64> {
+        let (mut below, mut above) = (None, None);
+        for &(of, at, rate) in self.lit.iter().filter(|(of, ..)| *of == sweep) {
+            debug_assert_eq!(of, sweep);
+            let off = at.light - pose.light;
+            let side = if off <= 0.0 { &mut below } else { &mut above };
+            if side.is_none_or(|(nearest, _): (f64, f64)| off.abs() <= nearest) {
+                *side = Some((off.abs(), rate));
+            }
+        }
+        let ((back, low), (on, high)) = (below?, above?);
+        let share = back / (back + on);
+        Some((low.ln() * (1.0 - share) + high.ln() * share).exp())
     }
 
     /// The exposure that brings a rate to the aim, or as near as the range of the photometer allows without
@@ -208,6 +232,7 @@ mod tests {
             device_ticks: 0,
             retries: 0,
             flags: Vec::new(),
+            swept_rad: None,
         }
     }
 

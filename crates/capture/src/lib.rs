@@ -3,19 +3,23 @@
 //! The executor is one loop over the steps of a plan; the journal is what is true. Only tokio time is used, so a
 //! whole capture runs under a paused clock against the in-process rig. Nothing here knows of reconstruction.
 
+mod blur;
 mod clock;
 mod error;
 mod event;
 mod execution;
 mod exposure;
 mod file_journal;
+mod flight;
 mod journal;
 mod mechanics;
 mod memory_journal;
 mod progress;
 mod reading;
 mod run;
+mod track;
 
+pub use blur::blur;
 pub use error::{CaptureError, JournalError};
 pub use event::{Command, Event, State};
 pub use file_journal::FileJournal;

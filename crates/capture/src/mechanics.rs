@@ -2,6 +2,8 @@ use arms::{ArmAngle, Pose};
 use rig::{Approach, Lamp, Port, RigFile};
 use sweep::Mechanics;
 
+use crate::exposure::brief;
+
 /// What a planner needs to know of the rig in a rig file, with the arms standing at `start`.
 pub fn mechanics(rig: &RigFile, start: Option<Pose>) -> Mechanics {
     Mechanics {
@@ -26,6 +28,7 @@ pub fn mechanics(rig: &RigFile, start: Option<Pose>) -> Mechanics {
             rig.photometer.integration_max_us,
         ],
         transaction_s: transaction_s(rig),
+        flight_s: flight_s(rig),
         warm_up_s: rig.photometer.lamp_warm_up.as_secs_f64(),
         dark_every_s: rig.visits.dark_every.as_secs_f64(),
         reference: match rig.visits.lamp {
@@ -37,6 +40,17 @@ pub fn mechanics(rig: &RigFile, start: Option<Pose>) -> Mechanics {
         },
         start,
     }
+}
+
+/// Expected time of a reading in flight: the light that a grey specimen gives, and of the transactions of a reading at rest
+/// an observation and a trigger.
+fn flight_s(rig: &RigFile) -> f64 {
+    /// Reflectance times cosine of something neither bright nor dark, sr⁻¹.
+    const GREY_PER_SR: f64 = 0.1;
+    const SHARE: f64 = 0.4;
+    let rate = GREY_PER_SR * rig.calibration.responsivity.into_iter().fold(0.0, f64::max);
+    let light_s = brief(rig, rate, f64::INFINITY).duration().as_secs_f64();
+    light_s + SHARE * transaction_s(rig)
 }
 
 /// Expected time on the bus for one reading.

@@ -11,6 +11,8 @@ pub enum Flag {
     Saturated,
     /// Too few counts even in the longest, strongest exposure.
     Dim,
+    /// An arm moved too far within its integration, or not as it was told to.
+    Blurred,
     /// The bus had to be asked more than once.
     Retried,
 }
@@ -30,7 +32,8 @@ pub struct Reading {
     pub lamp: bool,
     /// Where the arms were told to be.
     pub goal: Pose,
-    /// Where they were, measured after settling.
+    /// Where they were: measured after settling, or in flight worked out for mid-integration from what was measured around
+    /// it.
     pub measured: Pose,
     /// What the photometer said.
     pub counts: Counts,
@@ -40,4 +43,7 @@ pub struct Reading {
     pub retries: u32,
     /// What to know about it.
     pub flags: Vec<Flag>,
+    /// In flight, by how much each arm moved within the integration, rad, signed; `None`: they stood still.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub swept_rad: Option<[f64; 2]>,
 }

@@ -58,6 +58,7 @@ fn step(step: &sweep::Step) -> serde_json::Value {
         "sensor_deg": pose.sensor.deg(),
         "d_p": pose.deviation().abs(),
         "lamp": step.lamp,
+        "pass": step.pass,
         "legs": step.path.len(),
         "seconds": step.seconds,
     })
@@ -65,18 +66,21 @@ fn step(step: &sweep::Step) -> serde_json::Value {
 
 /// A plan for people: each sweep in a line, then what is left out.
 fn list(plan: &Plan) -> std::io::Result<()> {
-    let mut sweeps: Vec<(Sweep, usize, f64)> = Vec::new();
+    let mut sweeps: Vec<(Sweep, bool, usize, f64)> = Vec::new();
     for step in &plan.steps {
         match sweeps.last_mut().filter(|sweep| sweep.0 == step.sweep) {
-            Some((_, readings, seconds)) => {
+            Some((_, _, readings, seconds)) => {
                 *readings += 1;
                 *seconds += step.seconds;
             }
-            None => sweeps.push((step.sweep, 1, step.seconds)),
+            None => sweeps.push((step.sweep, step.pass.is_some(), 1, step.seconds)),
         }
     }
-    for (sweep, readings, seconds) in sweeps {
-        let name = sweep.to_string();
+    for (sweep, in_flight, readings, seconds) in sweeps {
+        let name = match in_flight {
+            true => format!("{sweep}, fly"),
+            false => sweep.to_string(),
+        };
         print::line(format_args!(
             "{name:<10} {readings:>5} readings {:>12}",
             clock(seconds)

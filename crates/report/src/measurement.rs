@@ -1,5 +1,7 @@
+use std::collections::HashMap;
+
 use arms::Pose;
-use capture::{Reading, Record};
+use capture::{Reading, Record, extended_plan};
 use glam::DVec3;
 use pdv::{Observation, Pdv};
 use rig::{Budget, Certificate, Reduction, RigFile, Taken, Unusable};
@@ -78,6 +80,7 @@ pub fn measurements(records: &[Record], rig: &RigFile) -> Vec<Measurement> {
         }
     };
     let mut measurements: Vec<Measurement> = readings.iter().map(measure).collect();
+    sharpen(&mut measurements, records);
     expand(&mut measurements, records, rig);
     measurements
 }
@@ -114,17 +117,100 @@ pub(crate) fn certificate(records: &[Record]) -> Option<&Certificate> {
     }
 }
 
-/// What the accepted readings of one sweep observed; those in shadow are left out.
+/// Takes from the readings of each flight what the motion within their integrations has added, by the readings next to
+/// them.
+fn sharpen(measurements: &mut [Measurement], records: &[Record]) {
+    let plan = extended_plan(records);
+    let mut flights: HashMap<usize, Vec<usize>> = HashMap::new();
+    for (i, m) in measurements.iter().enumerate() {
+        let step = plan.as_ref().and_then(|plan| plan.steps.get(m.reading.step));
+        let counts = m.reading.accepted && m.reading.swept_rad.is_some() && m.rgb().is_some();
+        if let (true, Some(pass)) = (counts, step.and_then(|step| step.pass)) {
+            flights.entry(pass).or_default().push(i);
+        }
+    }
+    for members in flights.values() {
+        let channel = |c: usize| -> Vec<(f64, f64)> {
+            let point = |&i: &usize| {
+                (
+                    measurements[i].pose.light.rad(),
+                    measurements[i].rgb().unwrap_or_default()[c],
+                )
+            };
+            members.iter().map(point).collect()
+        };
+        let points = [channel(0), channel(1), channel(2)];
+        for (at, &i) in members.iter().enumerate() {
+            let [light, sensor] = measurements[i].reading.swept_rad.unwrap_or_default();
+            let width = light.abs().max(sensor.abs());
+            let added = points.each_ref().map(|points| capture::blur(points, at, width));
+            let sharp = measurements[i]
+                .rgb()
+                .map(|rgb| Ok(rgb - DVec3::from_array(added)));
+            measurements[i].reflectance = sharp;
+        }
+    }
+}
+
+/// Share of a reflectance that one reading differs from the next of the same pose by, whatever its counts: no reading
+/// weighs more than that is worth.
+const REPRODUCIBLE: f64 = 0.01;
+
+/// The measurements of one sweep that count, by their place in the list, those of one pose together: a flight passes it
+/// there and back. Those in shadow are left out.
+pub(crate) fn visits(measurements: &[Measurement], sweep: Sweep) -> Vec<Vec<usize>> {
+    let mut places: HashMap<[u64; 2], usize> = HashMap::new();
+    let mut visits: Vec<Vec<usize>> = Vec::new();
+    for (i, m) in measurements.iter().enumerate() {
+        if m.reading.sweep != sweep || !m.reading.accepted || m.shadowed || m.rgb().is_none() {
+            continue;
+        }
+        let goal = m.reading.goal;
+        let place = [goal.light, goal.sensor].map(|angle| angle.rad().to_bits());
+        let at = *places.entry(place).or_insert(visits.len());
+        match visits.get_mut(at) {
+            Some(visit) => visit.push(i),
+            None => visits.push(vec![i]),
+        }
+    }
+    visits
+}
+
+/// The measurements of one visit as one observation, each by the inverse of its variance; `rgb` says what each saw.
+pub(crate) fn observation(
+    measurements: &[Measurement],
+    visit: &[usize],
+    mut rgb: impl FnMut(&Measurement) -> Option<DVec3>,
+) -> Option<Observation> {
+    let mut sum = Observation {
+        theta_r: 0.0,
+        deviation: 0.0,
+        rgb: DVec3::ZERO,
+    };
+    let mut weights = 0.0;
+    for m in visit.iter().map(|&i| &measurements[i]) {
+        let total = |of: DVec3| of.element_sum().abs().max(f64::MIN_POSITIVE);
+        let counting = m
+            .budget
+            .map_or(DVec3::ZERO, |budget| DVec3::from_array(budget.counting));
+        let relative = counting.length() / total(m.rgb()?);
+        let weight = 1.0 / (relative * relative + REPRODUCIBLE * REPRODUCIBLE);
+        sum.theta_r += weight * m.theta_r;
+        sum.deviation += weight * m.deviation;
+        sum.rgb += weight * rgb(m)?;
+        weights += weight;
+    }
+    (weights > 0.0).then(|| Observation {
+        theta_r: sum.theta_r / weights,
+        deviation: sum.deviation / weights,
+        rgb: sum.rgb / weights,
+    })
+}
+
+/// What one sweep observed: the readings of each pose together, those in shadow left out.
 pub fn observations(measurements: &[Measurement], sweep: Sweep) -> Vec<Observation> {
-    measurements
+    visits(measurements, sweep)
         .iter()
-        .filter(|m| m.reading.sweep == sweep && m.reading.accepted && !m.shadowed)
-        .filter_map(|m| {
-            Some(Observation {
-                theta_r: m.theta_r,
-                deviation: m.deviation,
-                rgb: m.rgb()?,
-            })
-        })
+        .filter_map(|visit| observation(measurements, visit, Measurement::rgb))
         .collect()
 }

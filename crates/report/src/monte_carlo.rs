@@ -9,6 +9,7 @@ use sweep::{Job, Sweep};
 
 use crate::Measurement;
 use crate::derive::Sweeps;
+use crate::measurement::{observation, visits};
 use crate::uncertainty::{COVERAGE, angles};
 
 /// Draws: the standard deviation over them is known to 13 %.
@@ -36,18 +37,12 @@ impl MonteCarlo {
             let common = Common::draw(&mut random, zero);
             let mut sweep = |sweep: Sweep| -> Vec<Observation> {
                 let of_sweep: [DVec3; 2] = [normal3(&mut random), normal3(&mut random)];
-                let used = measurements
-                    .iter()
-                    .filter(|m| m.reading.sweep == sweep && m.reading.accepted && !m.shadowed);
-                used.filter_map(|m| {
-                    let rgb = m.rgb()? + common.error(m, of_sweep, angle, &mut random)?;
-                    Some(Observation {
-                        theta_r: m.theta_r,
-                        deviation: m.deviation,
-                        rgb,
+                let mut draw = |visit: &Vec<usize>| {
+                    observation(measurements, visit, |m| {
+                        Some(m.rgb()? + common.error(m, of_sweep, angle, &mut random)?)
                     })
-                })
-                .collect()
+                };
+                visits(measurements, sweep).iter().filter_map(&mut draw).collect()
             };
             let sweeps = Sweeps {
                 planes: (0..job.planes.len()).map(|i| sweep(Sweep::Plane(i))).collect(),

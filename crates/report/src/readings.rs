@@ -39,6 +39,8 @@ struct Row {
     raw_g: Option<f64>,
     raw_b: Option<f64>,
     shadowed: bool,
+    light_swept_deg: Option<f64>,
+    sensor_swept_deg: Option<f64>,
 }
 
 impl Row {
@@ -78,13 +80,15 @@ impl Row {
             raw_g: measurement.raw.map(|f| f.y),
             raw_b: measurement.raw.map(|f| f.z),
             shadowed: measurement.shadowed,
+            light_swept_deg: reading.swept_rad.map(|[light, _]| light.to_degrees()),
+            sensor_swept_deg: reading.swept_rad.map(|[_, sensor]| sensor.to_degrees()),
         }
     }
 }
 
 /// Writes readings.csv: one row a reading, in the order in which they were taken; reflectance in sr⁻¹, empty where a
 /// reading has none (lamp off, saturated). `u` is the expanded uncertainty, k = 2; `raw` the reflectance in the sensor's
-/// own colours.
+/// own colours, `swept` by how much an arm moved within an integration in flight.
 ///
 /// # Errors
 /// The medium refused.

@@ -256,6 +256,7 @@ pub fn flag_name(flag: Flag) -> &'static str {
     match flag {
         Flag::Saturated => "saturated",
         Flag::Dim => "dim",
+        Flag::Blurred => "blurred",
         Flag::Retried => "retried",
     }
 }
@@ -317,6 +318,7 @@ mod tests {
             device_ticks,
             retries: 2,
             flags,
+            swept_rad: None,
         })
     }
 

@@ -4,7 +4,7 @@ use rig::{Filling, RigFile};
 use sweep::Sweep;
 
 use crate::Measurement;
-use crate::measurement::certificate;
+use crate::measurement::{certificate, observation, visits};
 
 /// Coverage factor of what is reported: 95 % of a normal distribution.
 pub const COVERAGE: f64 = 2.0;
@@ -33,18 +33,19 @@ pub(crate) fn sensitivities(measurements: &[Measurement], rig: &RigFile) -> Vec<
     });
     sweeps.dedup();
     for sweep in sweeps {
-        let used = |m: &Measurement| m.reading.sweep == sweep && m.reading.accepted && !m.shadowed;
-        let mut members: Vec<(usize, Point)> = measurements
-            .iter()
-            .enumerate()
-            .filter(|(_, m)| used(m))
-            .filter_map(|(i, m)| Some((i, (m.pose.light.rad(), m.rgb()?))))
+        let mut members: Vec<(Vec<usize>, Point)> = visits(measurements, sweep)
+            .into_iter()
+            .filter_map(|visit| {
+                let rgb = observation(measurements, &visit, Measurement::rgb)?.rgb;
+                let light: f64 = visit.iter().map(|&i| measurements[i].pose.light.rad()).sum();
+                Some((visit.clone(), (light / visit.len() as f64, rgb)))
+            })
             .collect();
         members.sort_by(|a, b| a.1.0.total_cmp(&b.1.0));
         let points: Vec<Point> = members.iter().map(|member| member.1).collect();
         let mut nearest = f64::INFINITY;
-        for (place, &(i, (_, f))) in members.iter().enumerate() {
-            let m = &measurements[i];
+        for (place, &(ref visit, (_, f))) in members.iter().enumerate() {
+            let m = &measurements[visit[0]];
             let [slope, bend] = derivatives(&points, place);
             let (along, blur) = match sweep {
                 Sweep::Plane(_) => {
@@ -58,10 +59,12 @@ pub(crate) fn sensitivities(measurements: &[Measurement], rig: &RigFile) -> Vec<
                 // Along the arc the lobe's width does not show; in angle it is that of the planes.
                 _ => (DVec3::ZERO, peak * f),
             };
-            found[i] = Sensitivity {
-                arms: arms(along, f, m, rig),
-                aperture: blur,
-            };
+            for &i in visit {
+                found[i] = Sensitivity {
+                    arms: arms(along, f, m, rig),
+                    aperture: blur,
+                };
+            }
         }
     }
     found

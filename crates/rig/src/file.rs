@@ -220,6 +220,8 @@ pub struct PhotometerSettings {
     pub aim: f64,
     /// Counts below which a reading is exposed again with more light.
     pub enough: u32,
+    /// Noise that a reading in flight may have, relative.
+    pub flight_noise_rel: f64,
     /// From lamp on to steady light.
     pub lamp_warm_up: Duration,
 }

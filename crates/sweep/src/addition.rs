@@ -50,7 +50,7 @@ pub fn add(
         return Ok(Vec::new());
     }
     let poses = targets.poses.clone();
-    let backwards = order(mechanics, Some(standing), std::slice::from_ref(&poses))[0].1;
+    let backwards = order(mechanics, Some(standing), std::slice::from_ref(&poses), &[false])[0].1;
     let mut draft = Draft::after(mechanics, standing, &plan.steps);
     let along = (0..poses.len()).map(|i| poses[if backwards { poses.len() - 1 - i } else { i }]);
     draft.sweep(&job.name, &mut targets, along)?;

@@ -3,7 +3,7 @@ use std::ops::{Range, RangeInclusive};
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::{Arc, Distribution, Job, Model, Plane, SweepError};
+use crate::{Arc, Distribution, Job, Mode, Model, Plane, SweepError};
 
 mod scene;
 mod until;
@@ -154,6 +154,7 @@ impl Job {
         });
         let until = raw
             .sweep
+            .as_ref()
             .map(|sweep| sweep.check(&source, raw.reconstruction.model))
             .transpose()?;
         let arc = raw.arc.map(|arc| {
@@ -173,6 +174,7 @@ impl Job {
             on_stage: raw.on_stage,
             planes: planes.collect::<Result<_, _>>()?,
             arc: arc.transpose()?,
+            mode: raw.sweep.as_ref().map_or(Mode::Step, |sweep| sweep.mode),
             model: raw.reconstruction.model,
             scene: raw.scene.map(|scene| scene.check(&source)).transpose()?,
             until: until.flatten(),

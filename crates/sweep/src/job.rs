@@ -14,6 +14,8 @@ pub struct Job {
     pub planes: Vec<Plane>,
     /// The mirror arc.
     pub arc: Option<Arc>,
+    /// How the arms take the readings.
+    pub mode: Mode,
     /// How the BRDF is made of the readings.
     pub model: Model,
     /// What will be looked at; `None`: everything.
@@ -30,6 +32,17 @@ pub struct Until {
     pub target_male: Option<f64>,
     /// Rig seconds of the whole run that may not be exceeded, 1 … 86 400.
     pub budget_s: Option<f64>,
+}
+
+/// How the arms take the readings of a sweep.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mode {
+    /// They stand still for each.
+    #[default]
+    Step,
+    /// They fly through all of them, there and back.
+    Fly,
 }
 
 /// One plane sweep: the sensor stands at θ_r, the light crosses the plane.

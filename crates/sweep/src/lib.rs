@@ -9,6 +9,7 @@ mod file;
 mod job;
 mod mechanics;
 mod order;
+mod pass;
 mod plan;
 mod planner;
 mod reach;
@@ -18,7 +19,7 @@ mod unread;
 
 pub use addition::{Addition, add};
 pub use error::SweepError;
-pub use job::{Arc, Job, Model, Plane, Until};
+pub use job::{Arc, Job, Mode, Model, Plane, Until};
 pub use mechanics::Mechanics;
 pub use pdv::{Cell, Distribution, Scene};
 pub use plan::{LeftOut, Plan, Step, Sweep};

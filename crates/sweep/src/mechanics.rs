@@ -24,6 +24,8 @@ pub struct Mechanics {
     pub integration_us: [u32; 2],
     /// Expected time on the bus and on the host for each reading, s.
     pub transaction_s: f64,
+    /// Expected seconds of one reading in flight: its light, and what the bus needs between two.
+    pub flight_s: f64,
     /// Lamp warm-up, s.
     pub warm_up_s: f64,
     /// Seconds between two sets of dark readings; 0: at the start alone.

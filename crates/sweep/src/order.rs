@@ -7,7 +7,7 @@ use crate::route::{Standing, route};
 const NO_WAY_S: f64 = 1e6;
 
 /// Order and direction of the sweeps with the least time of motion: pairs of a sweep's index and whether it is run
-/// backwards.
+/// backwards. `returns` says which of them go back to where they began.
 ///
 /// Exact: every sequence is covered by the recursion of Held and Karp (1962) over sets of finished sweeps, so time
 /// and memory grow like 2ⁿ; n ≤ 13 here.
@@ -15,11 +15,13 @@ pub(crate) fn order(
     mechanics: &Mechanics,
     start: Option<Standing>,
     sweeps: &[Vec<Pose>],
+    returns: &[bool],
 ) -> Vec<(usize, bool)> {
     let n = sweeps.len();
     let run = |node: usize| Run {
         poses: &sweeps[node / 2],
         backwards: node % 2 == 1,
+        returns: returns[node / 2],
     };
     let within: Vec<f64> = (0..2 * n).map(|node| run(node).seconds(mechanics)).collect();
     let between = |from: usize, to: usize| {
@@ -72,6 +74,7 @@ fn way_s(mechanics: &Mechanics, from: Standing, to: Pose) -> f64 {
 struct Run<'a> {
     poses: &'a [Pose],
     backwards: bool,
+    returns: bool,
 }
 
 impl Run<'_> {
@@ -88,7 +91,10 @@ impl Run<'_> {
     }
 
     fn last(&self) -> Pose {
-        self.at(self.poses.len() - 1)
+        match self.returns {
+            true => self.first(),
+            false => self.at(self.poses.len() - 1),
+        }
     }
 
     fn seconds(&self, mechanics: &Mechanics) -> f64 {
@@ -141,6 +147,7 @@ mod tests {
             settle_s: 0.0,
             integration_us: [100, 1000],
             transaction_s: 0.0,
+            flight_s: 0.0,
             warm_up_s: 0.0,
             dark_every_s: 0.0,
             reference: None,
@@ -190,7 +197,7 @@ mod tests {
         ) {
             let mechanics = mechanics(approach);
             let start = Standing { pose: start, approached: false };
-            let found = seconds(&mechanics, start, &sweeps, &order(&mechanics, Some(start), &sweeps));
+            let found = seconds(&mechanics, start, &sweeps, &order(&mechanics, Some(start), &sweeps, &[false; 3]));
             let best = all_orders().iter().map(|order| seconds(&mechanics, start, &sweeps, order)).fold(f64::INFINITY, f64::min);
             prop_assert!((found - best).abs() < 1e-9, "{found} s, possible are {best} s");
         }

@@ -1,10 +1,11 @@
 use arms::{Arm, Pose};
 
 use crate::order::order;
+use crate::pass::pass;
 use crate::reach::Reach;
 use crate::route::{Standing, route};
 use crate::targets::{Targets, arc, plane};
-use crate::{Job, LeftOut, Mechanics, Plan, Step, Sweep, SweepError, unread};
+use crate::{Job, LeftOut, Mechanics, Mode, Plan, Step, Sweep, SweepError, unread};
 
 /// Gain steps of the photometer.
 const GAINS: u8 = 3;
@@ -19,6 +20,9 @@ const DARK_REPEATS: usize = 4;
 /// visits to a reference pose follow the lamp, it begins and ends with one. Then the plane sweeps and the arc, in the order and direction with the least
 /// time of motion from where the arms stand. Angles are whole steps of the servos. Of a job with a scene, readings that no
 /// value in it is made of are left out.
+///
+/// In flight each sweep is passed there and back, every pose a step of both, so that what play and lateness add in one
+/// direction the other takes away. A sweep whose arms would not move alike is stepped, and the plan says so.
 ///
 /// # Errors
 /// The arms stand outside the envelope; a sweep of which nothing can be measured on this rig, with its key and why; a
@@ -68,7 +72,11 @@ fn lay(
         .filter(|&i| !sweeps[i].poses.is_empty())
         .collect();
     let poses: Vec<Vec<Pose>> = measured.iter().map(|&i| sweeps[i].poses.clone()).collect();
-    let order = order(mechanics, start, &poses);
+    let flown: Vec<bool> = measured
+        .iter()
+        .map(|&i| job.mode == Mode::Fly && may_fly(mechanics, &mut sweeps[i]))
+        .collect();
+    let order = order(mechanics, start, &poses, &flown);
     let first = order.first().map(|&(i, backwards)| {
         let pose = poses[i][if backwards { poses[i].len() - 1 } else { 0 }];
         Standing {
@@ -88,9 +96,15 @@ fn lay(
     draft.dark();
     draft.visit_reference(&job.name)?;
     for (i, backwards) in order {
-        let poses = &poses[i];
-        let along = (0..poses.len()).map(|j| poses[if backwards { poses.len() - 1 - j } else { j }]);
-        draft.sweep(&job.name, &mut sweeps[measured[i]], along)?;
+        let mut along = poses[i].clone();
+        if backwards {
+            along.reverse();
+        }
+        let sweep = &mut sweeps[measured[i]];
+        match flown[i] {
+            true => draft.fly(&job.name, sweep, along)?,
+            false => draft.sweep(&job.name, sweep, along.into_iter())?,
+        }
     }
     if draft.dark_sets > 1 {
         draft.dark();
@@ -105,6 +119,20 @@ fn lay(
     };
     check(&plan.steps, mechanics, start.pose)?;
     Ok(plan)
+}
+
+/// Whether a sweep can be flown; where not, what it leaves out says so.
+fn may_fly(mechanics: &Mechanics, sweep: &mut Targets) -> bool {
+    let may = pass(mechanics, &sweep.poses).is_some();
+    if !may {
+        sweep.left_out.push(LeftOut {
+            what: format!("{}, in flight", sweep.sweep),
+            why: "its arms would not move alike, or not freely: they stop for each reading".to_owned(),
+            readings: 0,
+            seconds: 0.0,
+        });
+    }
+    may
 }
 
 /// One reading that a calibration asks for.
@@ -174,6 +202,8 @@ pub(crate) struct Draft<'a> {
     mechanics: &'a Mechanics,
     steps: Vec<Step>,
     standing: Standing,
+    /// Flights so far.
+    passes: usize,
     /// Sets of dark readings so far.
     dark_sets: usize,
     /// Seconds since the last of them, and since the last visit to the reference pose.
@@ -189,6 +219,7 @@ impl<'a> Draft<'a> {
             mechanics,
             steps: Vec::new(),
             standing,
+            passes: 0,
             dark_sets: 0,
             since_dark_s: 0.0,
             since_visit_s: 0.0,
@@ -252,7 +283,7 @@ impl<'a> Draft<'a> {
             return false;
         };
         let seconds = route.seconds + self.mechanics.settle_s + integration_s + self.mechanics.transaction_s;
-        self.push(sweep, route.path, exposure, seconds);
+        self.push(sweep, route.path, exposure, None, seconds);
         self.standing = Standing {
             pose,
             approached: true,
@@ -274,6 +305,7 @@ impl<'a> Draft<'a> {
                         Sweep::Dark,
                         vec![self.standing.pose],
                         Some((gain, integration_us)),
+                        None,
                         seconds,
                     );
                 }
@@ -307,7 +339,48 @@ impl<'a> Draft<'a> {
         Ok(())
     }
 
-    fn push(&mut self, sweep: Sweep, path: Vec<Pose>, exposure: Option<(u8, u32)>, seconds: f64) {
+    /// A sweep in flight, there and back; left out where no safe way leads to it.
+    fn fly(&mut self, job: &str, targets: &mut Targets, mut poses: Vec<Pose>) -> Result<(), SweepError> {
+        for _ in 0..2 {
+            self.upkeep(job)?;
+            let way = route(self.mechanics, self.standing, poses[0]);
+            let (Some(route), Some(seconds)) = (way, pass(self.mechanics, &poses)) else {
+                targets.left_out.push(LeftOut {
+                    what: format!("{}, a pass of {} poses", targets.sweep, poses.len()),
+                    why: "no safe way leads there from the pose before".to_owned(),
+                    readings: poses.len(),
+                    seconds: 0.0,
+                });
+                continue;
+            };
+            let mut path = route.path;
+            let mut to_first_s = route.seconds + self.mechanics.settle_s;
+            for (&pose, seconds) in poses.iter().zip(seconds) {
+                let path = match std::mem::take(&mut path) {
+                    way if way.is_empty() => vec![pose],
+                    way => way,
+                };
+                let seconds = seconds + std::mem::take(&mut to_first_s);
+                self.push(targets.sweep, path, None, Some(self.passes), seconds);
+            }
+            self.passes += 1;
+            self.standing = Standing {
+                pose: poses[poses.len() - 1],
+                approached: true,
+            };
+            poses.reverse();
+        }
+        Ok(())
+    }
+
+    fn push(
+        &mut self,
+        sweep: Sweep,
+        path: Vec<Pose>,
+        exposure: Option<(u8, u32)>,
+        pass: Option<usize>,
+        seconds: f64,
+    ) {
         let lamp = sweep != Sweep::Dark;
         let seconds = match lamp && std::mem::take(&mut self.cold) {
             true => seconds + self.mechanics.warm_up_s,
@@ -321,6 +394,7 @@ impl<'a> Draft<'a> {
             path,
             lamp,
             exposure,
+            pass,
             seconds,
         });
     }

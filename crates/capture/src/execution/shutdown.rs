@@ -87,6 +87,10 @@ impl<R: Rig> Execution<'_, R> {
             false => None,
         };
         let device_ticks = device_ticks.map(|ticks| self.clock.unwrap(ticks));
+        // What a flight saw that did not land counts for nothing, and is kept.
+        for reading in std::mem::take(&mut self.aloft) {
+            self.journal.append(&Record::Reading(reading)).await?;
+        }
         let end = Record::End {
             outcome: outcome.clone(),
             device_ticks,

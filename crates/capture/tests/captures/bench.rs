@@ -104,6 +104,7 @@ impl Scene {
         // This rig has no wire.
         let mechanics = Mechanics {
             transaction_s: 0.0,
+            flight_s: 0.006,
             ..mechanics(&file, Some(start))
         };
         let plan = plan(&job, &mechanics).expect("possible on this rig");

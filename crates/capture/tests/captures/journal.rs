@@ -49,6 +49,7 @@ fn reading(step: usize) -> Record {
         device_ticks: 12,
         retries: 0,
         flags: vec![Flag::Saturated],
+        swept_rad: None,
     })
 }
 

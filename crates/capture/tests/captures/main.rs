@@ -3,6 +3,7 @@
 mod bench;
 mod extensions;
 mod faults;
+mod fly;
 mod journal;
 mod operator;
 mod suspend;

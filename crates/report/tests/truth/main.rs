@@ -3,3 +3,4 @@
 mod absolute;
 mod bench;
 mod coverage;
+mod flight;

@@ -27,6 +27,18 @@ impl<R: Rig> Drive<R> {
         self.start(self.file.nearest(to)).await
     }
 
+    /// Brakes both arms on their profiles and leaves all else as it is. [`Drive::rest`] waits until they stand.
+    ///
+    /// # Errors
+    /// A silent or failing servo.
+    pub async fn brake(&mut self) -> Result<(), DriveError<R::Error>> {
+        for arm in Arm::BOTH {
+            self.retry("brake an arm", |rig| Box::pin(rig.axis(arm).stop()))
+                .await?;
+        }
+        Ok(())
+    }
+
     /// Sends an arm on to the goal that the last snapshot saw, on another profile, which stays until the next one or
     /// until the arms are engaged. It goes nowhere that it was not going, so there is nothing to check.
     ///

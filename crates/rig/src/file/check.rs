@@ -248,6 +248,11 @@ fn photometer(source: &Source<'_>, raw: &RawPhotometer) -> Result<PhotometerSett
         full_scale: full_scale as u32,
         aim: source.within("photometer.aim", &raw.aim, 0.05..=0.9)?,
         enough: enough as u32,
+        flight_noise_rel: source.within(
+            "photometer.flight_noise_percent",
+            &raw.flight_noise_percent,
+            0.05..=10.0,
+        )? / 100.0,
         lamp_warm_up: millis(
             source,
             "photometer.lamp_warm_up_ms",

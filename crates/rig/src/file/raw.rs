@@ -72,6 +72,7 @@ pub(super) struct RawPhotometer {
     pub(super) full_scale: Spanned<i64>,
     pub(super) aim: Spanned<f64>,
     pub(super) enough: Spanned<i64>,
+    pub(super) flight_noise_percent: Spanned<f64>,
     pub(super) lamp_warm_up_ms: Spanned<f64>,
 }
 

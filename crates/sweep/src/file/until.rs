@@ -2,7 +2,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use super::Source;
-use crate::{Model, SweepError, Until};
+use crate::{Mode, Model, SweepError, Until};
 
 /// Errors that may be asked for, and rig seconds.
 const TARGET_MALE: std::ops::RangeInclusive<f64> = 1e-5..=1.0;
@@ -11,6 +11,8 @@ const BUDGET_S: std::ops::RangeInclusive<f64> = 1.0..=86_400.0;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawSweep {
+    #[serde(default)]
+    pub(super) mode: Mode,
     target_male: Option<Spanned<f64>>,
     budget_s: Option<Spanned<f64>>,
 }

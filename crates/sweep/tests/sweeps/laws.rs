@@ -1,6 +1,6 @@
 use arms::{Arm, ArmAngle, Limits, Pose};
 use proptest::prelude::*;
-use sweep::{Arc, Distribution, Job, Mechanics, Model, Plan, Plane, Sweep, SweepError, plan};
+use sweep::{Arc, Distribution, Job, Mechanics, Mode, Model, Plan, Plane, Sweep, SweepError, plan};
 
 use crate::{mechanics, poses};
 
@@ -50,6 +50,7 @@ prop_compose! {
         planes in prop::collection::vec(planes(), 1..4),
         arc in prop::option::of((1_usize..120, -0.6..0.6_f64)),
         mirror: bool,
+        fly: bool,
     ) -> Job {
         Job {
             name: "job.toml".to_owned(),
@@ -57,6 +58,7 @@ prop_compose! {
             on_stage: false,
             planes,
             arc: arc.map(|(readings, offset)| Arc { readings, offset: if mirror { 0.0 } else { offset } }),
+            mode: if fly { Mode::Fly } else { Mode::Step },
             model: Model::Separable,
             scene: None,
             until: None,
@@ -90,8 +92,25 @@ proptest! {
         }
     }
 
+    /// An arm in flight may be anywhere on its way when another is stuck.
+    #[test]
+    fn prop_a_flight_is_free_from_end_to_end_and_taken_there_and_back(job in jobs(), mechanics in rigs()) {
+        let plan = possible(&Job { mode: Mode::Fly, ..job }, &mechanics)?;
+        let passes = plan.steps.iter().filter_map(|step| step.pass).max().map_or(0, |last| last + 1);
+        let poses: Vec<Vec<_>> = (0..passes)
+            .map(|pass| plan.steps.iter().filter(|step| step.pass == Some(pass)).map(|step| step.pose()).collect())
+            .collect();
+        for pass in &poses {
+            prop_assert_eq!(mechanics.envelope.check_path(pass[0], pass[pass.len() - 1]), Ok(()));
+        }
+        for both in poses.chunks(2) {
+            prop_assert!(both.len() == 2 && both[0].iter().rev().eq(&both[1]));
+        }
+    }
+
     #[test]
     fn prop_nothing_asked_for_is_lost_unsaid(job in jobs(), mechanics in rigs()) {
+        let job = Job { mode: Mode::Step, ..job };
         let plan = possible(&job, &mechanics)?;
         let asked = job.planes.iter().map(|plane| plane.readings).sum::<usize>()
             + job.arc.map_or(0, |arc| arc.readings);
@@ -102,6 +121,7 @@ proptest! {
 
     #[test]
     fn prop_no_pose_is_read_twice_in_a_sweep(job in jobs(), mechanics in rigs()) {
+        let job = Job { mode: Mode::Step, ..job };
         let plan = possible(&job, &mechanics)?;
         let sweeps = (0..job.planes.len()).map(Sweep::Plane).chain([Sweep::Arc]);
         for sweep in sweeps {

@@ -38,6 +38,7 @@ fn mechanics() -> Mechanics {
         settle_s: 0.02,
         integration_us: [100, 100_000],
         transaction_s: 0.006,
+        flight_s: 0.009,
         warm_up_s: 0.2,
         dark_every_s: 600.0,
         reference: None,

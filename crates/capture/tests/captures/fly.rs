@@ -1,0 +1,192 @@
+//! Captures whose arms do not stop for a reading.
+
+use std::time::Duration;
+
+use capture::{Command, Flag, Outcome, Reading};
+use firmware_sim::{Disturbance, Fault};
+use rig::{Device, RigFile};
+
+use crate::bench::{QUICKSTART, Scene};
+
+const SHORT: &str =
+    "[[plane]]\ntheta_r_deg = 60\nreadings = 24\n[arc]\nreadings = 16\n[sweep]\nmode = \"fly\"";
+
+fn quickstart() -> String {
+    QUICKSTART.replace("mode = \"step\"", "mode = \"fly\"")
+}
+
+/// Seconds of a whole capture.
+async fn seconds(scene: &mut Scene) -> f64 {
+    let before = scene.bench.now();
+    assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+    (scene.bench.now() - before).as_secs_f64()
+}
+
+fn in_flight(scene: &Scene) -> Vec<&Reading> {
+    let accepted = scene.journal.accepted();
+    accepted
+        .into_iter()
+        .filter(|reading| reading.swept_rad.is_some())
+        .collect()
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_flight_is_twice_as_fast_as_stopping_and_below_40_s() {
+    for specimen in ["gold-paint"] {
+        let sim = format!("specimen = \"{specimen}\"");
+        let stepped_s = seconds(&mut Scene::new(QUICKSTART, &sim).await).await;
+        let mut scene = Scene::new(&quickstart(), &sim).await;
+        let flown_s = seconds(&mut scene).await;
+        let planned_s = scene.journal.plan().seconds();
+        let lit = scene.journal.accepted().iter().filter(|r| r.lamp).count();
+        let flown = in_flight(&scene).len();
+        println!(
+            "{specimen}: stepped {stepped_s:.2} s, flown {flown_s:.2} s (planned {planned_s:.2} s), {:.2} times as fast, \
+             {flown} of {lit} readings in flight",
+            stepped_s / flown_s
+        );
+        assert_each_once(&scene);
+        scene.assert_safe();
+        assert!(flown * 10 > lit * 9, "{flown} of {lit} in flight");
+        assert!(
+            flown_s < 40.0 && flown_s * 2.0 < stepped_s,
+            "{flown_s} s, {stepped_s} s stepped"
+        );
+        // What will be taken again at rest is not planned.
+        assert!(
+            (0.95..1.4).contains(&(flown_s / planned_s)),
+            "{flown_s} s, planned {planned_s} s"
+        );
+    }
+}
+
+/// Every step has one reading that counts.
+fn assert_each_once(scene: &Scene) {
+    let mut steps: Vec<usize> = scene.journal.accepted().iter().map(|r| r.step).collect();
+    steps.sort_unstable();
+    assert_eq!(steps, (0..scene.journal.plan().steps.len()).collect::<Vec<_>>());
+}
+
+/// Gives commands at times after the start.
+fn at(scene: &Scene, commands: &[(u64, Command)]) {
+    let (control, commands) = (scene.control.clone(), commands.to_vec());
+    let begun = tokio::time::Instant::now();
+    tokio::spawn(async move {
+        for (ms, command) in commands {
+            tokio::time::sleep_until(begun + Duration::from_millis(ms)).await;
+            control.send_replace(command);
+        }
+    });
+}
+
+/// The operator stops a capture before, in and between its flights, in every way, and goes on.
+#[tokio::test(start_paused = true)]
+async fn a_flight_that_is_stopped_is_safe_and_taken_again() {
+    let mut torn = 0;
+    for command in [Command::Finish, Command::Stop, Command::Estop] {
+        for ms in (1300..9000).step_by(350) {
+            let mut scene = Scene::new(SHORT, "").await;
+            at(&scene, &[(ms, command)]);
+            let outcome = scene.run(|_| ()).await.unwrap();
+            // The arms may still brake.
+            tokio::time::sleep(Duration::from_secs(1)).await;
+            scene.assert_safe();
+            if outcome == Outcome::Done {
+                continue;
+            }
+            assert_eq!(
+                matches!(outcome, Outcome::Failed { .. }),
+                command == Command::Estop,
+                "{outcome:?}"
+            );
+            torn += scene
+                .journal
+                .readings()
+                .iter()
+                .filter(|r| r.flags.contains(&Flag::Blurred))
+                .count();
+            let kept = scene.journal.readings().len();
+            scene.control.send_replace(Command::Run);
+            assert_eq!(
+                scene.run(|_| ()).await.unwrap(),
+                Outcome::Done,
+                "{command:?} after {ms} ms"
+            );
+            assert!(scene.journal.readings().len() > kept);
+            assert_each_once(&scene);
+            scene.assert_safe();
+        }
+    }
+    assert!(torn > 0, "nothing was stopped in flight");
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_flight_that_is_held_brakes_and_is_flown_again() {
+    for ms in (1300..8000).step_by(450) {
+        let mut scene = Scene::new(SHORT, "").await;
+        at(&scene, &[(ms, Command::Pause), (ms + 5000, Command::Run)]);
+        let (bench, mut at_rest) = (scene.bench.clone(), true);
+        let outcome = scene.run(|event| {
+            let held = matches!(
+                event,
+                capture::Event::State {
+                    state: capture::State::Paused
+                }
+            );
+            at_rest &= !held
+                || crate::bench::SERVOS.iter().all(|&servo| {
+                    crate::bench::peek(&bench, servo, rig::dynamixel::register::servo::MOVING) == 0
+                });
+        });
+        assert_eq!(outcome.await.unwrap(), Outcome::Done);
+        assert!(at_rest, "an arm moved when it was said to be held, {ms} ms");
+        assert_each_once(&scene);
+        scene.assert_safe();
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn an_arm_that_is_stuck_in_flight_is_a_fault_and_no_reading_counts() {
+    let mut scene = Scene::new(SHORT, "").await;
+    scene.bench.schedule(Fault {
+        device: Device::Light,
+        at: Duration::from_millis(3000),
+        what: Disturbance::Stall(Duration::from_secs(3)),
+    });
+    let outcome = scene.run(|_| ()).await.unwrap();
+    assert!(
+        matches!(&outcome, Outcome::Failed { fault } if fault.contains("light arm stands at")),
+        "{outcome:?}"
+    );
+    tokio::time::sleep(Duration::from_secs(4)).await;
+    scene.assert_safe();
+    assert!(in_flight(&scene).is_empty());
+    assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+    assert_each_once(&scene);
+}
+
+/// Between two readings of a mirror lie all gains of the photometer.
+#[tokio::test(start_paused = true)]
+async fn what_saturates_in_flight_is_taken_again_at_rest() {
+    let mut scene = Scene::new(SHORT, "specimen = \"mirror:0.9\"").await;
+    assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+    assert_each_once(&scene);
+    assert!(scene.journal.accepted().iter().all(|r| !r.counts.saturated));
+    let again = scene
+        .journal
+        .accepted()
+        .iter()
+        .filter(|r| r.lamp && r.swept_rad.is_none())
+        .count();
+    println!("{again} at rest");
+}
+
+/// Watchdogs that trip after 100 ms hear enough of a flight.
+#[tokio::test(start_paused = true)]
+async fn watchdogs_stay_armed_in_flight() {
+    let file = RigFile::parse("[motion]\nwatchdog_ms = 100", "test.toml".as_ref()).unwrap();
+    let mut scene = Scene::on(file, SHORT).await;
+    assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+    assert_each_once(&scene);
+    assert!(!in_flight(&scene).is_empty());
+}
