@@ -23,6 +23,11 @@ pub(crate) struct JobFile {
     /// How the BRDF is made of the readings.
     #[serde(default)]
     reconstruction: ReconstructionTable,
+    /// What will be looked at; everything unless given.
+    scene: Option<SceneTable>,
+    /// How the sweeps are run, and when to stop.
+    #[serde(default)]
+    sweep: SweepTable,
 }
 
 /// One plane sweep.
@@ -63,6 +68,57 @@ struct ReconstructionTable {
     /// Which model.
     #[serde(default)]
     model: ModelName,
+}
+
+/// What will be looked at.
+#[derive(Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "describes, never holds")]
+struct SceneTable {
+    /// Zenith angles of the light, least and largest, degrees, 0 … 90.
+    #[schema(min_items = 2, max_items = 2)]
+    theta_i_deg: Option<Vec<f64>>,
+    /// The same of the viewer.
+    #[schema(min_items = 2, max_items = 2)]
+    theta_o_deg: Option<Vec<f64>>,
+    /// Channels; all unless given.
+    #[schema(min_items = 1)]
+    channels: Option<Vec<ChannelName>>,
+}
+
+/// How the sweeps are run, and when to stop.
+#[derive(Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "describes, never holds")]
+struct SweepTable {
+    /// Whether the arms stop for each reading.
+    #[serde(default)]
+    mode: ModeName,
+    /// Error that is good enough, MALE.
+    #[schema(minimum = 0.00001, maximum = 1)]
+    target_male: Option<f64>,
+    /// Rig seconds that the run may take.
+    #[schema(minimum = 1, maximum = 86400)]
+    budget_s: Option<f64>,
+}
+
+/// A channel of the photometer.
+#[derive(Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+#[expect(dead_code, reason = "describes, never holds")]
+enum ChannelName {
+    R,
+    G,
+    B,
+}
+
+/// Whether the arms stop for each reading.
+#[derive(Default, Deserialize, ToSchema)]
+#[serde(rename_all = "lowercase")]
+enum ModeName {
+    #[default]
+    Step,
+    Fly,
 }
 
 /// How d_p is distributed.

@@ -40,18 +40,22 @@ async fn the_served_document_is_the_committed_one() {
 #[test]
 fn the_document_knows_every_key_and_word_of_a_job_file() {
     /// A table of the document, and a job file with something unknown in that table.
-    const UNKNOWN: [(&str, &str); 4] = [
+    const UNKNOWN: [(&str, &str); 6] = [
         ("JobFile", "unknown = 1"),
         ("PlaneTable", "[[plane]]\nunknown = 1"),
         ("ArcTable", "[arc]\nunknown = 1"),
         ("ReconstructionTable", "[reconstruction]\nunknown = 1"),
+        ("SceneTable", "[scene]\nunknown = 1"),
+        ("SweepTable", "[sweep]\nunknown = 1"),
     ];
-    const UNKNOWN_WORD: [(&str, &str); 2] = [
+    const UNKNOWN_WORD: [(&str, &str); 4] = [
         (
             "DistributionName",
             "[[plane]]\ntheta_r_deg = 1\nreadings = 1\ndistribution = \"unknown\"",
         ),
         ("ModelName", "[reconstruction]\nmodel = \"unknown\""),
+        ("ModeName", "[sweep]\nmode = \"unknown\""),
+        ("ChannelName", "[scene]\nchannels = [\"unknown\"]"),
     ];
     let document = serde_json::to_value(goniod::http::openapi()).unwrap();
     let schemas = &document["components"]["schemas"];

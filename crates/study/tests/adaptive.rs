@@ -1,0 +1,95 @@
+//! Captures that stop when good enough.
+
+use std::sync::Arc;
+
+use brdf::{Brdf, Fitted};
+use pdv::{Draw, compare};
+use rig::RigFile;
+use study::{Measured, measure};
+use sweep::Job;
+
+const FIRST: &str = "[[plane]]\ntheta_r_deg = 20\nreadings = 16\ndistribution = \"lobe\"\n[[plane]]\ntheta_r_deg = 70\n\
+    readings = 16\ndistribution = \"lobe\"\n[arc]\nreadings = 8\n[reconstruction]\nmodel = \"planes\"\n";
+
+fn captured(material: &Fitted, rest: &str) -> Measured {
+    let rig = RigFile::parse(RigFile::BUILT_IN, "built-in".as_ref()).expect("a good rig file");
+    let job = Job::parse(&format!("{FIRST}{rest}"), "job.toml").expect("a good job");
+    measure(&job, &rig, Arc::new(*material)).expect("the rig can do it")
+}
+
+/// MALE against the truth, and as it was expected.
+fn errors(material: &Fitted, measured: &Measured) -> (f64, f64) {
+    let model =
+        report::model(sweep::Model::Planes, &measured.planes, &measured.arc).expect("enough readings");
+    let draw = Draw {
+        pairs: 20_000,
+        ..Draw::default()
+    };
+    let estimate: &dyn Brdf = &model;
+    let male = compare(material, &[estimate], &draw)[0]
+        .overall
+        .male
+        .expect("all pairs are valid");
+    let expected = measured
+        .adapted
+        .as_ref()
+        .and_then(|adapted| adapted.expected_male);
+    (male, expected.expect("it was asked"))
+}
+
+#[test]
+fn it_stops_at_the_budget_and_says_so() {
+    let material = Fitted::named("gold-paint").expect("a fitted material");
+    let first = captured(&material, "");
+    assert_eq!(
+        (first.planes.len(), &first.adapted),
+        (2, &None),
+        "without a key nothing changes"
+    );
+    let measured = captured(&material, "[sweep]\nbudget_s = 40\n");
+    let adapted = measured.adapted.as_ref().expect("its plan is open");
+    assert!(
+        !adapted.added.is_empty() && measured.readings > first.readings,
+        "{adapted:?}"
+    );
+    // The bus takes its time beside the device's clock; what is planned is known to a few per cent.
+    assert!(measured.rig_s < 44.0, "{} s: {adapted:?}", measured.rig_s);
+    let stopped = adapted.stopped.as_deref().expect("it ended");
+    assert!(
+        stopped.starts_with("the budget is spent") || stopped.starts_with("the floor"),
+        "{stopped}"
+    );
+}
+
+#[test]
+fn it_stops_at_the_target_and_says_so() {
+    let material = Fitted::named("gold-paint").expect("a fitted material");
+    let measured = captured(&material, "[sweep]\ntarget_male = 0.5\n");
+    let adapted = measured.adapted.as_ref().expect("its plan is open");
+    assert!(
+        adapted.added.is_empty(),
+        "the first sweeps are enough: {adapted:?}"
+    );
+    let stopped = adapted.stopped.as_deref().expect("it ended");
+    assert!(stopped.starts_with("the target is reached"), "{stopped}");
+    let (male, _) = errors(&material, &measured);
+    assert!(male < 0.5, "{male}");
+}
+
+/// Of every twelfth fitted material; `examples/expected.rs` tries all of them.
+#[test]
+fn the_expected_error_is_right_within_a_factor_of_2() {
+    let materials: Vec<(&str, Fitted)> = Fitted::all().step_by(12).collect();
+    let mut right = 0;
+    for (name, material) in &materials {
+        let measured = captured(material, "[sweep]\nbudget_s = 45\n");
+        let (male, expected) = errors(material, &measured);
+        println!("{name}: expected {expected:.5}, found {male:.5}");
+        right += usize::from((expected / male).ln().abs() < 2.0_f64.ln());
+    }
+    assert!(
+        10 * right >= 8 * materials.len(),
+        "{right} of {}",
+        materials.len()
+    );
+}
