@@ -98,7 +98,7 @@ proptest! {
         let plan = possible(&Job { mode: Mode::Fly, ..job }, &mechanics)?;
         let passes = plan.steps.iter().filter_map(|step| step.pass).max().map_or(0, |last| last + 1);
         let poses: Vec<Vec<_>> = (0..passes)
-            .map(|pass| plan.steps.iter().filter(|step| step.pass == Some(pass)).map(|step| step.pose()).collect())
+            .map(|pass| plan.steps.iter().filter(|step| step.pass == Some(pass)).map(sweep::Step::pose).collect())
             .collect();
         for pass in &poses {
             prop_assert_eq!(mechanics.envelope.check_path(pass[0], pass[pass.len() - 1]), Ok(()));
