@@ -18,7 +18,7 @@ fn quickstart() -> String {
 /// Seconds of a whole capture.
 async fn seconds(scene: &mut Scene) -> f64 {
     let before = scene.bench.now();
-    assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+    assert_eq!(scene.run(|_| ()).await.expect("it runs"), Outcome::Done);
     (scene.bench.now() - before).as_secs_f64()
 }
 

@@ -105,7 +105,6 @@ struct SweepTable {
 /// A channel of the photometer.
 #[derive(Deserialize, ToSchema)]
 #[serde(rename_all = "lowercase")]
-#[expect(dead_code, reason = "describes, never holds")]
 enum ChannelName {
     R,
     G,
