@@ -21,7 +21,7 @@ pub enum Addition {
 /// be measured.
 ///
 /// # Errors
-/// As [`crate::plan`].
+/// As [`crate::plan()`].
 pub fn add(
     job: &Job,
     plan: &Plan,
