@@ -80,10 +80,10 @@ impl Excess {
             most: DVec3::INFINITY,
         };
         let most = readings
-            .map(|p| excess.log(p.rgb, p.cosines))
+            .map(|p| excess.ratio(p.rgb, p.cosines))
             .fold(DVec3::ZERO, DVec3::max);
         Self {
-            most: most.map(|log| (Self::RISE * log.exp_m1()).ln_1p()),
+            most: (Self::RISE * most).map(f64::ln_1p),
             ..excess
         }
     }
@@ -91,8 +91,14 @@ impl Excess {
     /// G·F of a reflectance: ln(1 + excess/(s V)).
     #[inline]
     pub(crate) fn log(&self, rgb: DVec3, cosines: Cosines) -> DVec3 {
+        self.ratio(rgb, cosines).map(f64::ln_1p)
+    }
+
+    /// excess/(s V) of a reflectance.
+    #[inline]
+    fn ratio(&self, rgb: DVec3, cosines: Cosines) -> DVec3 {
         let excess = (rgb - self.diffuse * self.shape.falloff(cosines)).max(self.least);
-        (excess / self.shape.lobe_scale(cosines)).map(f64::ln_1p)
+        excess / self.shape.lobe_scale(cosines)
     }
 
     /// The reflectance of a G·F.

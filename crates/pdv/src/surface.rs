@@ -92,9 +92,9 @@ impl Surface {
             for (at, p) in points.iter().enumerate() {
                 let next = points[(at + 1).min(points.len() - 1)].theta_h.abs();
                 let weight = next - points[at.saturating_sub(1)].theta_h.abs();
-                let found = self.at(p.bisected(), Some(n));
-                let log = |rgb: DVec3| (rgb * p.cos_i + EPSILON).map(f64::ln);
-                errors += weight * (log(found) - log(p.rgb)).abs().element_sum() / 3.0;
+                let [found, read] =
+                    [self.at(p.bisected(), Some(n)), p.rgb].map(|rgb| rgb * p.cos_i + EPSILON);
+                errors += weight * (found / read).map(f64::ln).abs().element_sum() / 3.0;
                 weights += weight;
             }
             if weights > 0.0 {
