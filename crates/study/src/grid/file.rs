@@ -66,7 +66,7 @@ struct RawCompare {
 }
 
 impl Grid {
-    /// Reads the text of a study file; `file` names it in errors. A `quick` one has every tenth of the materials, a
+    /// Reads the text of a study file; `file` names it in errors. A `quick` one has every fifteenth of the materials, a
     /// fifth of the pairs, and of readings and arc the first, the middle and the last.
     ///
     /// # Errors
@@ -76,7 +76,7 @@ impl Grid {
         let raw: Raw = check.parse(text)?;
         check.number("every", raw.every, raw.every > 0, "1 …")?;
         let materials = raw.materials.materials(file)?;
-        let every = if quick { raw.every.max(10) } else { raw.every };
+        let every = if quick { raw.every.max(15) } else { raw.every };
         if raw.models.is_empty() {
             return Err(check.range("models", "empty", "at least one"));
         }
