@@ -71,7 +71,7 @@ fn the_shipped_study_covers_the_grid() {
         assert!(grid.plans.iter().any(|plan| plan.planes_deg.len() == number));
     }
     let quick = study::Grid::parse(text, "error-against-time.toml", true).unwrap();
-    assert_eq!((quick.materials.len(), quick.plans.len()), (10, 9 * 3 * 3));
+    assert_eq!((quick.materials.len(), quick.plans.len()), (7, 9 * 3 * 3));
     let error = |from: &str, to: &str| {
         assert!(text.contains(from));
         let wrong = study::Grid::parse(&text.replacen(from, to, 1), "x.toml", false);
