@@ -95,14 +95,13 @@ try {
   await until("the light arm to move", async () => (await angle(main, "light")) !== before);
   await until("readings in G", async () => (await dots(main, "g")) >= 30);
 
-  console.log("pauses and goes on");
+  console.log("pauses");
   await main.getByRole("button", { name: "Pause" }).click();
   await until("paused", async () => (await main.locator("#state").textContent()) === "paused");
   await look("paused");
-  await main.getByRole("button", { name: "Go on" }).click();
-  await until("running", async () => (await main.locator("#state").textContent()) === "running");
 
-  console.log("reads a value by mouse and by keyboard");
+  // Each new reading draws the plot anew, under the mouse.
+  console.log("reads a value by mouse and by keyboard, and goes on");
   const dot = await main.locator("#plot-g circle").nth(20).boundingBox();
   await main.locator("#plot-g").scrollIntoViewIfNeeded();
   await main.locator("#plot-g circle").nth(20).hover({ force: true });
@@ -110,6 +109,9 @@ try {
   await main.locator("#plot-g").focus();
   await main.keyboard.press("ArrowRight");
   assert.match(await main.locator("#plot-g output").textContent(), /^d_p/);
+
+  await main.getByRole("button", { name: "Go on" }).click();
+  await until("running", async () => (await main.locator("#state").textContent()) === "running");
 
   console.log("presses the emergency stop's key");
   await main.keyboard.press("Escape");
