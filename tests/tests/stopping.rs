@@ -32,8 +32,8 @@ fn only_run(directory: &Path) -> PathBuf {
     runs[0].clone()
 }
 
-/// Starts a run that tells every event, and returns once it has told of so many readings.
-fn started(directory: &Path, readings: usize) -> (Child, BufReader<std::process::ChildStderr>) {
+/// Starts a run that tells every event, and returns once it has told of so many of one kind.
+fn started(directory: &Path, kind: &str, events: usize) -> (Child, BufReader<std::process::ChildStderr>) {
     let mut child = Command::new(GONIOCTL)
         .args(RUN)
         .current_dir(directory)
@@ -44,13 +44,13 @@ fn started(directory: &Path, readings: usize) -> (Child, BufReader<std::process:
         .unwrap();
     let mut stderr = BufReader::new(child.stderr.take().unwrap());
     let (mut line, mut seen) = (String::new(), 0);
-    while seen < readings {
+    while seen < events {
         line.clear();
         assert!(
             stderr.read_line(&mut line).unwrap() > 0,
-            "it ended before {readings} readings"
+            "it ended before {events} of {kind}"
         );
-        seen += usize::from(line.contains("Reading {"));
+        seen += usize::from(line.contains(kind));
     }
     (child, stderr)
 }
@@ -96,7 +96,7 @@ fn resume(directory: &Path, before: &Captured) {
 fn one_interrupt_finishes_the_reading_and_leaves_a_run_to_resume() {
     let temporary = tempfile::tempdir().unwrap();
     prepare(temporary.path());
-    let (child, stderr) = started(temporary.path(), 100);
+    let (child, stderr) = started(temporary.path(), "Reading {", 100);
     signal(&child, Signal::INT);
     let finished = ended(child, stderr).expect(4);
     assert!(
@@ -137,7 +137,8 @@ fn a_second_interrupt_is_an_emergency_stop() {
         "motion.settle_ms = 5000\nsim.clock = \"real\"\n",
     )
     .unwrap();
-    let (child, mut stderr) = started(temporary.path(), 1);
+    // Between two readings the first signal would end it by itself.
+    let (child, mut stderr) = started(temporary.path(), "Step {", 2);
     signal(&child, Signal::INT);
     let mut line = String::new();
     while !line.contains("again for an emergency stop") {

@@ -61,9 +61,11 @@ pub(crate) async fn obey(mut signals: Signals, sender: watch::Sender<Command>) {
     ];
     for (command, word) in words {
         signals.next().await;
-        print::say(word);
         // Nobody listens any more once the capture has ended.
-        let _ = sender.send(command);
+        match sender.send(command) {
+            Ok(()) => print::say(word),
+            Err(_) => print::say("the capture has already ended; its results are being written"),
+        }
     }
 }
 

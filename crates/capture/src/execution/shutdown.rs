@@ -2,7 +2,7 @@ use rig::{Device, DriveError, FaultKind, Rig};
 use sweep::SweepError;
 
 use super::{Execution, now};
-use crate::{CaptureError, Event, JournalError, Outcome, Record};
+use crate::{CaptureError, Command, Event, JournalError, Outcome, Record};
 
 const LAMP_OUT: &str =
     "the lamp is out although it was switched on: the photometer has restarted, or the lamp has failed";
@@ -49,15 +49,21 @@ impl<R: Rig> Execution<'_, R> {
             _ => {}
         }
         let at_rest = matches!(result, Ok(()) | Err(Interrupt::Finish));
-        let unsafe_left = match result {
+        let mut unsafe_left = match result {
             _ if !self.touched => Vec::new(),
             _ if at_rest => self.drive.disengage_all().await,
-            Err(Interrupt::Estop) => {
-                let mut failed = self.drive.halt_all().await;
-                failed.extend(self.drive.disengage_all().await);
-                failed
-            }
+            Err(Interrupt::Estop) => self.halt().await,
             _ => self.stop().await,
+        };
+        // An emergency stop that comes while it shuts down is one all the same.
+        let late = matches!(result, Ok(()) | Err(Interrupt::Finish | Interrupt::Stop))
+            && *self.control.borrow() == Command::Estop;
+        let result = match late {
+            true => {
+                unsafe_left.extend(self.halt().await);
+                Err(Interrupt::Estop)
+            }
+            false => result,
         };
         for error in &unsafe_left {
             tracing::warn!("while shutting down: {}", chain(error));
@@ -109,6 +115,15 @@ impl<R: Rig> Execution<'_, R> {
         for error in self.stop().await {
             tracing::warn!("while shutting down: {}", chain(&error));
         }
+    }
+
+    async fn halt(&mut self) -> Vec<DriveError<R::Error>> {
+        if !self.touched {
+            return Vec::new();
+        }
+        let mut failed = self.drive.halt_all().await;
+        failed.extend(self.drive.disengage_all().await);
+        failed
     }
 
     async fn stop(&mut self) -> Vec<DriveError<R::Error>> {

@@ -260,6 +260,41 @@ async fn an_emergency_stop_halts_arms_on_their_way_at_once() {
 }
 
 #[tokio::test(start_paused = true)]
+async fn an_emergency_stop_while_it_shuts_down_is_one_all_the_same() {
+    for before in [None, Some(Command::Finish), Some(Command::Stop)] {
+        let mut scene = Scene::new(SHORT, "").await;
+        let control = scene.control.clone();
+        let mut ending = after(3, &scene.control, before.unwrap_or_default());
+        let outcome = scene.run(move |event| {
+            let shuts_down = Event::State {
+                state: State::ShuttingDown,
+            };
+            if event == shuts_down {
+                control.send_replace(Command::Estop);
+            }
+            ending(event);
+        });
+        let fault = "emergency stop".to_owned();
+        assert_eq!(
+            outcome.await.unwrap(),
+            Outcome::Failed { fault },
+            "after {before:?}"
+        );
+        assert!(
+            matches!(
+                scene.journal.records.last(),
+                Some(Record::End {
+                    outcome: Outcome::Failed { .. },
+                    ..
+                })
+            ),
+            "after {before:?}"
+        );
+        scene.assert_safe();
+    }
+}
+
+#[tokio::test(start_paused = true)]
 async fn a_stop_decelerates_on_the_profile_without_swinging_back() {
     let mut scene = Scene::new(SHORT, "imperfections = \"none\"").await;
     let (control, bench) = (scene.control.clone(), scene.bench.clone());
