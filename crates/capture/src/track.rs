@@ -18,6 +18,8 @@ pub(crate) struct Track {
     /// When each motion began.
     legs: Vec<(f64, Trajectory)>,
     seen: Vec<(f64, f64)>,
+    /// Sums over all measurements of how far the arm lagged times its speed, and of the speed squared.
+    lags: (f64, f64),
 }
 
 impl Track {
@@ -26,6 +28,7 @@ impl Track {
         Self {
             legs: vec![(f64::NEG_INFINITY, Trajectory::new(angle, 0.0, angle, profile))],
             seen: Vec::new(),
+            lags: (0.0, 0.0),
         }
     }
 
@@ -38,6 +41,10 @@ impl Track {
 
     /// The arm was measured.
     pub(crate) fn saw(&mut self, t_s: f64, angle: f64) {
+        // What it was told by then never changes, so that it need not be asked again at every look.
+        let (told, speed) = self.told(t_s);
+        self.lags.0 += (told - angle) * speed;
+        self.lags.1 += speed * speed;
         self.seen.push((t_s, angle));
     }
 
@@ -50,12 +57,7 @@ impl Track {
 
     /// By how much the arm is late, s: what fits all measurements best, where it moved.
     pub(crate) fn late_s(&self) -> f64 {
-        let (mut products, mut squares) = (0.0, 0.0);
-        for &(t_s, angle) in &self.seen {
-            let (told, speed) = self.told(t_s);
-            products += (told - angle) * speed;
-            squares += speed * speed;
-        }
+        let (products, squares) = self.lags;
         if squares > 0.0 {
             (products / squares).clamp(0.0, LATEST_S)
         } else {

@@ -80,9 +80,7 @@ impl<R: Rig> Execution<'_, R> {
         let mut ranging = self.ranging.clone();
         let (_, now_s) = self.sight(flight).await?;
         self.pace(flight, &ranging, now_s);
-        for &arm in &flight.moving {
-            self.drive.steer(arm, flight.profile).await?;
-        }
+        self.steer(flight).await?;
         let (_, now_s) = self.sight(flight).await?;
         self.drive.set_off(flight.end()).await?;
         flight.steered(now_s);
@@ -93,9 +91,7 @@ impl<R: Rig> Execution<'_, R> {
             }
             let (seen, now_s) = self.sight(flight).await?;
             if self.pace(flight, &ranging, now_s) {
-                for &arm in &flight.moving {
-                    self.drive.steer(arm, flight.profile).await?;
-                }
+                self.steer(flight).await?;
                 flight.steered(now_s);
             }
             let step = &flight.steps[flight.next];
@@ -124,6 +120,14 @@ impl<R: Rig> Execution<'_, R> {
             }
         }
         Ok(true)
+    }
+
+    /// Gives the moving arms the profile that the flight chose.
+    async fn steer(&mut self, flight: &Flight<'_>) -> Result<(), Interrupt<R::Error>> {
+        for &arm in &flight.moving {
+            self.drive.steer(arm, flight.profile).await?;
+        }
+        Ok(())
     }
 
     /// Observes the rig and tells the flight; also returns when that was, s.
