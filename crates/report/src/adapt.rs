@@ -2,7 +2,7 @@ use capture::{Extension, Record, extended_plan};
 use pdv::Expectation;
 use rig::RigFile;
 use serde::Serialize;
-use sweep::{Addition, Job, Plan, Step, Sweep, Until};
+use sweep::{Addition, Job, MAX_PLANES, Plan, Step, Sweep, THETA_R_DEG, Until};
 
 use crate::derive::Sweeps;
 use crate::{Run, measurements};
@@ -11,10 +11,6 @@ use crate::{Run, measurements};
 const LEAST_GAIN: f64 = 0.01;
 /// Planes are no closer than this, rad: nearer ones would say nothing new.
 const CLOSEST: f64 = 0.07;
-/// No plane's sensor stands further out, rad, as in job files.
-const THETA_R_MAX: f64 = 85.0 * std::f64::consts::PI / 180.0;
-/// Most planes of one run.
-const MAX_PLANES: usize = 12;
 
 /// How a run that stops when good enough came to its end.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -170,7 +166,7 @@ fn offers(job: &Job, plan: &Plan, expected: &Expectation, rig: &RigFile) -> Vec<
     let planes = worth
         .planes
         .iter()
-        .map(|&(theta_r, gain)| (theta_r.min(THETA_R_MAX), gain))
+        .map(|&(theta_r, gain)| (theta_r.min(THETA_R_DEG.end().to_radians()), gain))
         .filter(|&(theta_r, _)| job.planes.len() < MAX_PLANES && far(theta_r))
         .filter_map(|(theta_r, gain)| {
             let name = format!("a plane at {:.1}°", theta_r.to_degrees());

@@ -12,9 +12,9 @@ use scene::RawScene;
 use until::RawSweep;
 
 /// Most plane sweeps of one job: their order is found by trying every one.
-const MAX_PLANES: usize = 12;
+pub const MAX_PLANES: usize = 12;
 /// Degrees from the normal at which a plane's sensor may stand.
-const THETA_R_DEG: RangeInclusive<f64> = 0.0..=85.0;
+pub const THETA_R_DEG: RangeInclusive<f64> = 0.0..=85.0;
 /// Readings of one sweep.
 const READINGS: RangeInclusive<i64> = 1..=2000;
 /// Deviation that an arc keeps.

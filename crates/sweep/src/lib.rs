@@ -19,6 +19,7 @@ mod unread;
 
 pub use addition::{Addition, add};
 pub use error::SweepError;
+pub use file::{MAX_PLANES, THETA_R_DEG};
 pub use job::{Arc, Job, Mode, Model, Plane, Until};
 pub use mechanics::Mechanics;
 pub use pdv::{Cell, Distribution, Scene};
