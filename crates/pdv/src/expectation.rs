@@ -6,18 +6,11 @@ use glam::DVec3;
 use crate::bisected::Pair;
 use crate::surface::Surface;
 use crate::sweeps::Sweeps;
+use crate::table::{STEPS, THETA_MAX};
 use crate::{Cell, Error, Observation, Scene, Shape};
 
 /// Pairs of directions over which changes are averaged: their mean is known to a few per cent.
 const PAIRS: usize = 1024;
-/// Largest zenith angle of those pairs, rad, as where errors are judged.
-const THETA_MAX: f64 = 80.0 * PI / 180.0;
-/// Steps of the additive sequence in three dimensions (Roberts 2018): powers of the root of x⁴ = x + 1.
-const STEPS: [f64; 3] = [
-    0.819_172_513_396_164_4,
-    0.671_043_606_703_789_3,
-    0.549_700_477_901_970_3,
-];
 /// Changes below this are none: what is left of rounding and of black specimens.
 const LEAST: f64 = 1e-6;
 

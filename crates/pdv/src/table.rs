@@ -12,9 +12,16 @@ const ROWS: usize = 20;
 const STRIDE: usize = 3 * COLUMNS;
 /// Half angles, rad, of which one is where a table begins to be logarithmic: whichever loses least.
 const KNEES: [f64; 6] = [1e-4, 1e-3, 4e-3, 1e-2, 2.5e-2, 6e-2];
-/// Pairs by which a table is judged, and their largest zenith angle, rad.
+/// Pairs by which a table is judged.
 const DRAWN: u32 = 2000;
-const THETA_MAX: f64 = 80.0 * std::f64::consts::PI / 180.0;
+/// Steps of the additive sequence in three dimensions (Roberts 2018): powers of the root of x⁴ = x + 1.
+pub(crate) const STEPS: [f64; 3] = [
+    0.819_172_513_396_164_4,
+    0.671_043_606_703_789_3,
+    0.549_700_477_901_970_3,
+];
+/// Largest zenith angle of pairs on which models are judged, rad.
+pub(crate) const THETA_MAX: f64 = 80.0 * std::f64::consts::PI / 180.0;
 /// Largest |log₂ f| that is stored; 2⁻¹²⁰ is 7.5e-37 sr⁻¹.
 const LOG_MAX: f64 = 120.0;
 
@@ -274,12 +281,9 @@ pub(crate) fn logs(rgb: DVec3) -> Vec3 {
 
 /// Pairs of directions even in angle below 80°, as pairs in the plane; always the same.
 fn drawn() -> impl Iterator<Item = Bisected> {
-    let fraction = |n: u32, ratio: f64| (f64::from(n) * ratio).fract();
-    (0..DRAWN).map(move |n| {
-        // Steps of the plastic number's three-dimensional sequence.
-        let [i, o] =
-            [0.819_172_513_396_164_4, 0.671_043_606_703_789_2].map(|ratio| fraction(n, ratio) * THETA_MAX);
-        let phi = fraction(n, 0.549_700_477_901_970_3) * std::f64::consts::TAU;
+    (0..DRAWN).map(|n| {
+        let [i, o, turn] = STEPS.map(|step| (f64::from(n) * step).fract());
+        let (i, o, phi) = (i * THETA_MAX, o * THETA_MAX, turn * std::f64::consts::TAU);
         let direction = |theta: f64, phi: f64| brdf::Spherical { theta, phi }.direction();
         Pair::new(direction(i, phi), direction(o, 0.0)).same_half()
     })
