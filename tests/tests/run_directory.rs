@@ -6,6 +6,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use brdf::{MerlTable, Spherical};
 use serde_json::Value;
 use tests::run;
 
@@ -166,4 +167,51 @@ fn reconstruct_makes_the_same_files_again_from_the_journal_alone() {
     let arguments = [&arguments[..], &[exported.to_str().unwrap()]].concat();
     let _ = run(GONIOCTL, &root(), &arguments).expect(0);
     assert!(fs::read(exported).unwrap() == fs::read(directory.join("brdf.binary")).unwrap());
+}
+
+/// By a histogram of directions that lies beside the job file: light within 10 … 40°, viewer within 0 … 30°.
+#[test]
+fn what_the_scene_does_not_look_at_is_minus_one_in_the_merl_file() {
+    let temporary = tempfile::tempdir().unwrap();
+    let here = temporary.path();
+    let job = "[[plane]]\ntheta_r_deg = 20.0\nreadings = 24\n[[plane]]\ntheta_r_deg = 60.0\nreadings = 24\n[arc]\n\
+        readings = 16\n[reconstruction]\nmodel = \"planes\"\n[scene]\ndirections = \"seen.csv\"\n\
+        channels = [\"g\", \"b\"]\n";
+    fs::write(here.join("job.toml"), job).unwrap();
+    fs::write(here.join("rig.toml"), "").unwrap();
+    let rows = (10..40)
+        .step_by(5)
+        .flat_map(|i| (0..30).step_by(5).map(move |o| format!("{}.5,{o}.5,1\n", i)));
+    let table: String = std::iter::once("theta_i_deg,theta_o_deg,weight\n".to_owned())
+        .chain(rows)
+        .collect();
+    fs::write(here.join("seen.csv"), table).unwrap();
+    let planned = run(GONIOCTL, here, &["plan", "job.toml", "--rig", "rig.toml"]).expect(0);
+    assert!(planned.stdout.contains("left out"), "{}", planned.stdout);
+    let finished = run(GONIOCTL, here, &["run", "job.toml", "--rig", "rig.toml"]).expect(0);
+    let directory = here.join(finished.stdout.trim());
+    // The run says all that it needs.
+    fs::remove_file(here.join("seen.csv")).unwrap();
+    let again = run(GONIOCTL, here, &["reconstruct", directory.to_str().unwrap()]);
+    let _ = again.expect(0);
+    let found = MerlTable::read(&directory.join("brdf.binary")).unwrap();
+    let within = |theta: f64, [low, high]: [f64; 2]| (low - 1e-6..=high + 1e-6).contains(&theta.to_degrees());
+    let looked_at = |i: f64, o: f64| within(i, [10.0, 40.0]) && within(o, [0.0, 30.0]);
+    let mut inside = 0;
+    for (n, &[r, g, b]) in found.nodes().iter().enumerate() {
+        let index = [n / (90 * 180), n / 180 % 90, n % 180];
+        let (incident, exitant) = MerlTable::coordinates(index).directions();
+        let [i, o] = [incident, exitant].map(|direction| Spherical::from_direction(direction).theta);
+        // One entry holds a pair and the same pair swapped.
+        if looked_at(i, o) || looked_at(o, i) {
+            inside += 1;
+            assert!(r < 0.0 && g >= 0.0 && b >= 0.0, "{index:?}: {r} {g} {b}");
+        } else {
+            assert!(
+                [r, g, b].iter().all(|&value| value < 0.0),
+                "{index:?}: {r} {g} {b}"
+            );
+        }
+    }
+    assert!(inside > 1000, "{inside} entries");
 }

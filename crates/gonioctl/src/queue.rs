@@ -1,6 +1,5 @@
 use std::path::Path;
 
-use anyhow::Context;
 use goniod::{Job, JobId, JobState};
 
 use crate::daemon::{ClientError, Daemon};
@@ -11,8 +10,7 @@ use crate::print;
 /// # Errors
 /// The file cannot be read, or is wrong; the daemon does not answer, or refuses.
 pub(crate) fn submit(daemon: &Daemon, file: &Path, as_json: bool) -> anyhow::Result<()> {
-    let text = std::fs::read_to_string(file)
-        .with_context(|| format!("cannot read the job file {}", file.display()))?;
+    let text = goniod::job_text(file)?;
     let path = format!("/jobs?name={}", encoded(&file.to_string_lossy()));
     let job: Job = daemon.hand_in(&path, "application/toml", &text)?;
     if as_json {

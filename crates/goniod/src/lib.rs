@@ -7,6 +7,7 @@
 mod calibrate;
 mod certificates;
 mod daemon;
+mod directions;
 mod error;
 mod event;
 mod hand;
@@ -29,6 +30,7 @@ mod view;
 pub use calibrate::{Calibrated, Calibration};
 pub use certificates::Certificates;
 pub use daemon::{Daemon, Settings};
+pub use directions::job_text;
 pub use error::DaemonError;
 pub use event::{Event, Events, What};
 pub use job::{Action, Caller, Job, JobId, Submission};

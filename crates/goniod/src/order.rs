@@ -7,8 +7,8 @@ use rig::{Certificate, RigFile};
 use sweep::{Job, Plan};
 use ulid::Ulid;
 
-use crate::DaemonError;
 use crate::certificates::Certificates;
+use crate::{DaemonError, job_text};
 
 /// Where a rig file is looked for when none is named, seen from the working directory.
 const RIG_HERE: &str = "config/rig.toml";
@@ -20,7 +20,7 @@ pub struct Order {
     pub job: Job,
     /// The rig.
     pub rig: RigFile,
-    /// The job file as given.
+    /// The job file as given, with what it names written out.
     pub job_text: String,
     /// The rig file as given.
     pub rig_text: String,
@@ -29,13 +29,13 @@ pub struct Order {
 }
 
 impl Order {
-    /// Reads a job file and a rig file: the one named, else config/rig.toml in the working directory if there is one,
+    /// Reads a job file, with the histogram that it may name, and a rig file: the one named, else config/rig.toml in the working directory if there is one,
     /// else the built-in one.
     ///
     /// # Errors
     /// A file that cannot be read, or what is wrong in it with its place.
     pub fn read(job: &Path, rig: Option<&Path>) -> Result<Self, DaemonError> {
-        let job_text = read("job file", job)?;
+        let job_text = job_text(job)?;
         let (rig_text, rig_name) = rig_text(rig)?;
         Self::parse(job_text, &job.to_string_lossy(), rig_text, &rig_name)
     }

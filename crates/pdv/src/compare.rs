@@ -8,6 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::quantile::Quantiles;
+use crate::{Cell, Scene};
 
 /// Floor of relative errors, sr⁻¹: what a photometer of this kind can tell from nothing.
 const FLOOR: f64 = 1e-3;
@@ -90,6 +91,19 @@ pub struct Comparison {
 ///
 /// The result depends on the draw alone, not on the number of cores.
 pub fn compare(reference: &(impl Brdf + ?Sized), estimates: &[&dyn Brdf], draw: &Draw) -> Vec<Comparison> {
+    compare_within(&Scene::whole(), reference, estimates, draw)
+}
+
+/// The same over the pairs of a scene alone: its cells are drawn by their weights, and θ_i and θ_o evenly in each.
+///
+/// Where the whole scene lies beyond `draw.theta_max`, it is taken as it is. Its channels do not matter here.
+pub fn compare_within(
+    scene: &Scene,
+    reference: &(impl Brdf + ?Sized),
+    estimates: &[&dyn Brdf],
+    draw: &Draw,
+) -> Vec<Comparison> {
+    let cells = scene.below(draw.theta_max);
     let streams: Vec<Vec<[Sums; 3]>> = (0..STREAMS)
         .into_par_iter()
         .map(|stream| {
@@ -98,8 +112,9 @@ pub fn compare(reference: &(impl Brdf + ?Sized), estimates: &[&dyn Brdf], draw: 
             let share = draw.pairs / STREAMS + u64::from(stream < draw.pairs % STREAMS);
             let mut sums: Vec<[Sums; 3]> = estimates.iter().map(|_| [(); 3].map(|()| Sums::new())).collect();
             for _ in 0..share {
-                let theta_i = rng.random::<f64>() * draw.theta_max;
-                let theta_o = rng.random::<f64>() * draw.theta_max;
+                let cell = drawn(&cells, &mut rng);
+                let mut within = |[low, high]: [f64; 2]| low + rng.random::<f64>() * (high - low);
+                let (theta_i, theta_o) = (within(cell.theta_i), within(cell.theta_o));
                 let incident = Spherical {
                     theta: theta_i,
                     phi: rng.random::<f64>() * TAU,
@@ -134,6 +149,21 @@ pub fn compare(reference: &(impl Brdf + ?Sized), estimates: &[&dyn Brdf], draw: 
             }
         })
         .collect()
+}
+
+/// One of some cells by their weights.
+fn drawn<'a>(cells: &'a [Cell], rng: &mut ChaCha8Rng) -> &'a Cell {
+    let [cell] = cells else {
+        let all: f64 = cells.iter().map(|cell| cell.weight).sum();
+        let mut left = rng.random::<f64>() * all;
+        let drawn = cells.iter().find(|cell| {
+            left -= cell.weight;
+            left < 0.0
+        });
+        // Rounding may leave a little.
+        return drawn.or(cells.last()).unwrap_or(&Cell::WHOLE);
+    };
+    cell
 }
 
 #[inline]

@@ -7,7 +7,7 @@ use crate::bisected::Pair;
 use crate::surface::Surface;
 use crate::sweeps::Sweeps;
 use crate::table::{STEPS, THETA_MAX};
-use crate::{Cell, Error, Observation, Scene, Shape};
+use crate::{Error, Observation, Scene, Shape};
 
 /// Pairs of directions over which changes are averaged: their mean is known to a few per cent.
 const PAIRS: usize = 1024;
@@ -95,7 +95,7 @@ impl Expectation {
             readings: halves.iter().sum(),
             arc: without(planes, &along),
             sides: sides.unwrap_or(form),
-            level: whole.iter().map(|log| over.mean(*log)).sum::<f64>() / whole.len() as f64,
+            level: over.over_all(whole.iter().copied()),
         };
         Ok(Self {
             male: signs.male(planes.iter().filter(|plane| !plane.is_empty()).count()),
@@ -143,36 +143,37 @@ impl Signs {
 /// Weights of [`Signs::terms`].
 const WEIGHTS: [f64; 8] = [-2.2299, 0.0723, 0.3044, 0.3009, -0.0776, 0.0028, 0.0338, -0.0968];
 
-/// Pairs of the scene, and the channels that count.
+/// Pairs of the scene, each with its share of all that is looked at, and the channels that count.
 struct Over {
-    pairs: Vec<(DVec3, Pair)>,
+    pairs: Vec<(f64, DVec3, Pair)>,
     channels: DVec3,
 }
 
 impl Over {
     fn new(scene: Option<&Scene>) -> Self {
-        let cells = scene.map_or(&[Cell::WHOLE][..], |scene| &scene.cells);
+        let cells = scene.unwrap_or(&Scene::whole()).below(THETA_MAX);
         let channels = scene.map_or([true; 3], |scene| scene.channels);
         let weights = DVec3::from_array(channels.map(|wanted| f64::from(u8::from(wanted))));
-        let cut = |[low, high]: [f64; 2]| [low.min(THETA_MAX), high.min(THETA_MAX)];
-        let span = |[low, high]: [f64; 2]| (high - low).max(1e-3);
-        let area = |cell: &Cell| span(cut(cell.theta_i)) * span(cut(cell.theta_o));
-        let all: f64 = cells.iter().map(area).sum();
+        let all: f64 = cells.iter().map(|cell| cell.weight).sum();
+        let mut next = 0;
         let pairs = cells.iter().flat_map(|cell| {
-            let count = (PAIRS as f64 * area(cell) / all).ceil() as usize;
-            (0..count).map(|n| {
+            let share = cell.weight / all;
+            let count = (PAIRS as f64 * share).ceil() as usize;
+            let first = next;
+            next += count;
+            (first..next).map(move |n| {
                 let [u, v, w] = STEPS.map(|step| (0.5 + step * n as f64).fract());
                 let within = |[low, high]: [f64; 2], share: f64| low + (high - low) * share;
                 let incident = Spherical {
-                    theta: within(cut(cell.theta_i), u),
+                    theta: within(cell.theta_i, u),
                     phi: PI * w,
                 };
                 let exitant = Spherical {
-                    theta: within(cut(cell.theta_o), v),
+                    theta: within(cell.theta_o, v),
                     phi: 0.0,
                 };
                 let (incident, exitant) = (incident.direction(), exitant.direction());
-                (incident, Pair::new(incident, exitant))
+                (share / count as f64, incident, Pair::new(incident, exitant))
             })
         });
         Self {
@@ -183,7 +184,7 @@ impl Over {
 
     /// ln(1 + f cos θ_i) at every pair.
     fn logs(&self, surface: &Surface, at: impl Fn(&Surface, &Pair) -> DVec3) -> Vec<DVec3> {
-        let log = |(incident, pair): &(DVec3, Pair)| (at(surface, pair) * incident.z).map(f64::ln_1p);
+        let log = |(_, incident, pair): &(f64, DVec3, Pair)| (at(surface, pair) * incident.z).map(f64::ln_1p);
         self.pairs.iter().map(log).collect()
     }
 
@@ -191,9 +192,17 @@ impl Over {
         rgb.dot(self.channels)
     }
 
+    /// Mean over the pairs of what is given for each, and over the channels.
+    fn over_all(&self, values: impl Iterator<Item = DVec3>) -> f64 {
+        let weighted = self.pairs.iter().zip(values);
+        weighted
+            .map(|((share, ..), value)| share * self.mean(value))
+            .sum()
+    }
+
     fn change(&self, before: &[DVec3], after: &[DVec3]) -> f64 {
-        let changes = before.iter().zip(after).map(|(a, b)| self.mean((*a - *b).abs()));
-        changes.sum::<f64>() / before.len() as f64
+        let changes = before.iter().zip(after).map(|(a, b)| (*a - *b).abs());
+        self.over_all(changes)
     }
 
     /// What changes where only some of the readings are there; 0 where nothing can be made of them.

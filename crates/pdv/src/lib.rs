@@ -36,7 +36,7 @@ mod within;
 pub use albedo::albedo;
 pub use auto::Auto;
 pub use bivariate::Bivariate;
-pub use compare::{Channels, Comparison, Draw, Metrics, compare};
+pub use compare::{Channels, Comparison, Draw, Metrics, compare, compare_within};
 pub use coordinates::{Pdv, light_angle};
 pub use density::{Density, mean_reflectance};
 pub use error::Error;

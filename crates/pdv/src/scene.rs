@@ -26,6 +26,8 @@ pub struct Cell {
     pub theta_i: [f64; 2],
     /// Of the viewer, least and largest.
     pub theta_o: [f64; 2],
+    /// How often pairs in it are looked at, relative to the other cells, above 0.
+    pub weight: f64,
 }
 
 impl Cell {
@@ -33,6 +35,7 @@ impl Cell {
     pub const WHOLE: Self = Self {
         theta_i: [0.0, FRAC_PI_2],
         theta_o: [0.0, FRAC_PI_2],
+        weight: 1.0,
     };
 
     fn holds(&self, theta_i: f64, theta_o: f64) -> bool {
@@ -42,11 +45,36 @@ impl Cell {
 }
 
 impl Scene {
+    /// Everything.
+    pub fn whole() -> Self {
+        Self {
+            cells: vec![Cell::WHOLE],
+            channels: [true; 3],
+        }
+    }
+
     /// Whether light and viewer are looked at as they are.
     pub fn holds(&self, incident: DVec3, exitant: DVec3) -> bool {
         let [theta_i, theta_o] =
             [incident, exitant].map(|direction| Spherical::from_direction(direction).theta);
         self.cells.iter().any(|cell| cell.holds(theta_i, theta_o))
+    }
+
+    /// The cells as far as they reach below a zenith angle, rad; as they are where none does.
+    pub(crate) fn below(&self, theta_max: f64) -> Vec<Cell> {
+        let cut = |[low, high]: [f64; 2]| [low, high.min(theta_max)];
+        let below = |cell: &&Cell| cell.theta_i[0] < theta_max && cell.theta_o[0] < theta_max;
+        let cells = self.cells.iter().filter(below).map(|cell| Cell {
+            theta_i: cut(cell.theta_i),
+            theta_o: cut(cell.theta_o),
+            ..*cell
+        });
+        let cells: Vec<Cell> = cells.collect();
+        if cells.is_empty() {
+            self.cells.clone()
+        } else {
+            cells
+        }
     }
 
     /// Pairs all over the scene, its edges included, at even steps of the angles: 2° and 5°.

@@ -3,7 +3,7 @@ use std::io::{self, Write};
 use brdf::{Brdf, MerlTable};
 use capture::{FileJournal, Record};
 use glam::{BVec3, DVec3};
-use pdv::{Comparison, Draw, Model, Scene, compare};
+use pdv::{Comparison, Draw, Model, Scene, compare_within};
 use rig::RigFile;
 use serde::Serialize;
 use sweep::{Job, LeftOut};
@@ -85,7 +85,8 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
     }
     let errors = model.as_ref().zip(truth.as_ref()).map(|(model, truth)| {
         let estimate: &dyn Brdf = model.as_ref();
-        compare(truth, &[estimate], &Draw::default()).remove(0)
+        let scene = job.scene.clone().unwrap_or_else(Scene::whole);
+        compare_within(&scene, truth, &[estimate], &Draw::default()).remove(0)
     });
     let report = Report {
         specimen: job.specimen.clone(),

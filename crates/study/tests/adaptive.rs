@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use brdf::{Brdf, Fitted};
-use pdv::{Draw, compare};
+use pdv::{Draw, Scene, compare, compare_within};
 use rig::RigFile;
 use study::{Measured, measure};
 use sweep::Job;
@@ -91,5 +91,55 @@ fn the_expected_error_is_right_within_a_factor_of_2() {
         10 * right >= 8 * materials.len(),
         "{right} of {}",
         materials.len()
+    );
+}
+
+/// A target is reached earlier where only a part counts, and what is expected is the error in that part.
+#[test]
+fn of_a_scene_the_error_in_it_is_expected() {
+    const SCENE: &str = "[scene]\ndirections = [[0, 30, 0, 60, 1], [30, 60, 0, 60, 3]]\n";
+    let draw = Draw {
+        pairs: 20_000,
+        ..Draw::default()
+    };
+    let mut seconds = [0.0; 2];
+    for name in ["gold-paint", "blue-rubber", "pink-fabric", "chrome"] {
+        let material = Fitted::named(name).expect("a fitted material");
+        let found = ["", SCENE].map(|scene| {
+            let measured = captured(
+                &material,
+                &format!("[sweep]\ntarget_male = 0.0008\nbudget_s = 90\n{scene}"),
+            );
+            let job = Job::parse(&format!("{FIRST}{scene}"), "job.toml").expect("a good job");
+            let model = report::model(sweep::Model::Planes, &measured.planes, &measured.arc)
+                .expect("enough readings");
+            let scene = job.scene.unwrap_or_else(Scene::whole);
+            let male = compare_within(&scene, &material, &[&model as &dyn Brdf], &draw)[0]
+                .overall
+                .male;
+            let adapted = measured.adapted.expect("its plan is open");
+            let expected = adapted.expected_male.expect("it was asked");
+            (
+                measured.rig_s,
+                male.expect("pairs are left"),
+                expected,
+                adapted.stopped,
+            )
+        });
+        println!("{name}: whole, scene: {found:?}");
+        for (seconds, found) in seconds.iter_mut().zip(&found) {
+            *seconds += found.0;
+        }
+        let (_, male, expected, _) = found[1];
+        // How much is expected was learnt over the whole hemisphere: in a part of it may be less, and is in chrome, but
+        // nobody is told too little.
+        assert!(male < 2.0 * expected, "{name}: {expected} expected, {male} found");
+        assert!(expected < 5.0 * male, "{name}: {expected} expected, {male} found");
+    }
+    assert!(
+        seconds[1] < seconds[0],
+        "{} s for the scene, {} s for everything",
+        seconds[1],
+        seconds[0]
     );
 }

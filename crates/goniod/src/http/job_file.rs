@@ -81,6 +81,13 @@ struct SceneTable {
     /// The same of the viewer.
     #[schema(min_items = 2, max_items = 2)]
     theta_o_deg: Option<Vec<f64>>,
+    /// Instead of either range: cells of a histogram of directions, each with the light's zenith angle from … to, the
+    /// viewer's from … to, degrees, and how often it is looked at.
+    #[schema(min_items = 1)]
+    directions: Option<Vec<[f64; 5]>>,
+    /// Share of the weight of all cells that those which are kept have at least, the heaviest first; 1 unless given.
+    #[schema(minimum = 0.01, maximum = 1)]
+    share: Option<f64>,
     /// Channels; all unless given.
     #[schema(min_items = 1)]
     channels: Option<Vec<ChannelName>>,

@@ -5,6 +5,7 @@
 
 mod adaptive;
 mod bench;
+mod directions;
 mod faults;
 mod jobs;
 mod operator;

@@ -73,3 +73,25 @@ fn channels_that_nobody_asks_for_are_named() {
     );
     assert!(!names.contains(&"channel green"), "{names:?}");
 }
+
+#[test]
+fn a_histogram_is_the_union_of_its_cells() {
+    let ranges = planned(
+        Model::Planes,
+        "[scene]\ntheta_i_deg = [0, 40]\ntheta_o_deg = [0, 40]",
+    );
+    let cells = "[[0, 40, 0, 20, 3], [0, 40, 20, 40, 0.01]]";
+    let cut = planned(Model::Planes, &format!("[scene]\ndirections = {cells}"));
+    assert_eq!(poses(&cut, Sweep::Arc), poses(&ranges, Sweep::Arc));
+    // What is hardly ever looked at may be left out, and then more need not be read.
+    let most = planned(
+        Model::Planes,
+        &format!("[scene]\ndirections = {cells}\nshare = 0.99"),
+    );
+    assert!(
+        most.seconds() < cut.seconds(),
+        "{} s of {} s",
+        most.seconds(),
+        cut.seconds()
+    );
+}
