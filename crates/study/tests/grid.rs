@@ -9,8 +9,9 @@ const TEXT: &str = "
 study = \"error-against-time\"
 materials = [\"gold-paint\", \"blue-rubber\", \"brass\"]
 every = 2
-models = [\"separable\", \"reciprocal\"]
+models = [\"separable\", \"reciprocal\", \"planes\"]
 plans = { planes_deg = [[30.0]], readings = [8], distribution = \"capped\", arc = [0, 8] }
+adaptive = { planes_deg = [20.0, 70.0], readings = 8, arc = 8, budget_s = [30] }
 pca = { readings = [2], folds = 3 }
 compare = { pairs = 500, theta_max_deg = 80.0, seed = 3 }
 ";
@@ -20,7 +21,7 @@ fn rows(directory: &Path) -> Vec<Vec<String>> {
     let text = fs::read_to_string(directory.join("study.csv")).expect("the study wrote it");
     let cells = |line: &str| -> Vec<String> {
         let cells = line.split(',').map(str::to_owned).enumerate();
-        cells.filter(|(i, _)| *i != 9).map(|(_, cell)| cell).collect()
+        cells.filter(|(i, _)| *i != 10).map(|(_, cell)| cell).collect()
     };
     text.lines().map(cells).collect()
 }
@@ -30,10 +31,12 @@ fn an_interrupted_study_ends_as_a_whole_one_does() {
     let directory = tempfile::tempdir().unwrap();
     let study = Study::parse(TEXT, "study.toml", false).unwrap();
     let words = study.run(directory.path(), &|_, _| ()).unwrap();
-    assert!(words.contains("2 materials, 4 captures"), "{words}");
+    assert!(words.contains("2 materials, 6 captures"), "{words}");
+    assert!(words.contains("planned on the way, "), "{words}");
     let whole = rows(directory.path());
-    // Two plans with two models each, the floor of both models, black and PCA; two materials; the heading.
-    assert_eq!(whole.len(), 2 * (4 + 2 + 2) + 1);
+    // Two plans with two models each, one made on the way, the floor of both models, black and PCA; two materials; the
+    // heading.
+    assert_eq!(whole.len(), 2 * (4 + 1 + 2 + 2) + 1);
     for name in [
         "front.csv",
         "floor.csv",
@@ -66,12 +69,12 @@ fn the_shipped_study_covers_the_grid() {
     let text = include_str!("../../../config/studies/error-against-time.toml");
     let grid = study::Grid::parse(text, "error-against-time.toml", false).unwrap();
     assert_eq!((grid.materials.len(), grid.known.len()), (20, 100));
-    assert_eq!(grid.plans.len(), 9 * 6 * 5);
+    assert_eq!(grid.plans.len(), 9 * 6 * 5 + 6);
     for number in [1, 2, 3, 4, 7] {
         assert!(grid.plans.iter().any(|plan| plan.planes_deg.len() == number));
     }
     let quick = study::Grid::parse(text, "error-against-time.toml", true).unwrap();
-    assert_eq!((quick.materials.len(), quick.plans.len()), (7, 9 * 3 * 3));
+    assert_eq!((quick.materials.len(), quick.plans.len()), (7, 9 * 3 * 3 + 3));
     let error = |from: &str, to: &str| {
         assert!(text.contains(from));
         let wrong = study::Grid::parse(&text.replacen(from, to, 1), "x.toml", false);

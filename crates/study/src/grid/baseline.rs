@@ -20,6 +20,7 @@ pub(crate) fn rows(grid: &Grid, judge: &Judge) -> Vec<GridRow> {
         planes_deg: String::new(),
         readings: 0,
         arc: 0,
+        budget_s: None,
         model,
         taken,
         exposures: 0,
@@ -63,7 +64,7 @@ pub(crate) fn rows(grid: &Grid, judge: &Judge) -> Vec<GridRow> {
 /// A model cannot be made.
 pub(crate) fn floor(grid: &Grid, judge: &Judge, material: &Material) -> Result<Vec<GridRow>, Error> {
     let reference = judge.values(material.brdf.as_ref());
-    let mut sets: Vec<&[f64]> = grid.plans.iter().map(|plan| plan.planes_deg.as_slice()).collect();
+    let mut sets: Vec<&[f64]> = grid.fixed().map(|plan| plan.planes_deg.as_slice()).collect();
     sets.dedup();
     let arc: Vec<Observation> = (0..DENSE)
         .filter_map(|i| {
@@ -79,6 +80,7 @@ pub(crate) fn floor(grid: &Grid, judge: &Judge, material: &Material) -> Result<V
             readings: DENSE,
             distribution: pdv::Distribution::Capped,
             arc: DENSE,
+            budget_s: None,
         };
         for &model in grid.models.iter().filter(|&&model| plan.suits(model)) {
             let begun = std::time::Instant::now();
@@ -95,6 +97,7 @@ pub(crate) fn floor(grid: &Grid, judge: &Judge, material: &Material) -> Result<V
                 planes_deg: plan.planes(),
                 readings: DENSE,
                 arc: DENSE,
+                budget_s: None,
                 model: model.name().to_owned(),
                 taken: plan.total(),
                 exposures: 0,

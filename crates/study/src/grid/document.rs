@@ -2,7 +2,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::front::{Family, Line, Point, families, front, points, within};
+use super::front::{Family, Line, Point, adaptive, families, front, points, within};
 use super::{Grid, GridRow, Source};
 use crate::figure::{Axis, COLOURS, Curve, Figure, Mark, SeriesLabelPosition};
 use crate::page::Page;
@@ -11,6 +11,10 @@ use crate::{Error, ledger, write};
 /// Seconds of rig time over which the fronts are compared.
 const FROM_S: f64 = 10.0;
 const TO_S: f64 = 600.0;
+
+/// What the plans are called that are made on the way, and their colour.
+const ADAPTIVE: &str = "planned on the way";
+const ADAPTIVE_COLOUR: [u8; 3] = [20, 20, 20];
 
 /// A baseline against the program's own front.
 #[derive(Clone, Debug, Serialize)]
@@ -83,6 +87,7 @@ struct Study<'a> {
     rows: &'a [GridRow],
     families: Vec<Family>,
     floors: Vec<Point>,
+    adaptive: Vec<Point>,
 }
 
 impl<'a> Study<'a> {
@@ -93,6 +98,7 @@ impl<'a> Study<'a> {
             rows,
             families: families(rows),
             floors,
+            adaptive: adaptive(rows),
         }
     }
 
@@ -119,6 +125,7 @@ impl<'a> Study<'a> {
         for family in &self.families {
             lines.extend(front(&family.points).iter().map(|point| point.line(&family.name)));
         }
+        lines.extend(self.adaptive.iter().map(|point| point.line(ADAPTIVE)));
         lines
     }
 
@@ -176,6 +183,18 @@ impl<'a> Study<'a> {
                     point.plan()
                 );
             }
+        }
+        for point in &self.adaptive {
+            let Some(fixed) = within(&own, point.rig_s) else {
+                continue;
+            };
+            text += &format!(
+                "{ADAPTIVE}, {:.0} s of {} s: MALE {:.5}, {:.2} times that of the best fixed plan of no more time\n",
+                point.rig_s,
+                point.budget_s.unwrap_or_default(),
+                point.male.median,
+                point.male.median / fixed.male.median
+            );
         }
         for against in &summary.baselines {
             let word = match against.least_ratio > 1.0 {
@@ -265,6 +284,13 @@ impl<'a> Study<'a> {
             let name = format!("PCA, {n} readings out of plane");
             curves.extend(level(&name, colour, &format!("pca-{n}")));
         }
+        let on_the_way = self.adaptive.iter().map(|point| (point.rig_s, of(point).median));
+        curves.push(Curve::new(
+            ADAPTIVE,
+            ADAPTIVE_COLOUR,
+            Mark::Dots,
+            on_the_way.collect(),
+        ));
         let (line, band) = steps(&own, &of);
         curves.push(Curve {
             band,
@@ -359,7 +385,15 @@ impl Summary {
         let mut captures: Vec<_> = rows
             .iter()
             .filter(|row| row.source == Source::Rig)
-            .map(|row| (&row.material, &row.planes_deg, row.readings, row.arc))
+            .map(|row| {
+                (
+                    &row.material,
+                    &row.planes_deg,
+                    row.readings,
+                    row.arc,
+                    row.budget_s,
+                )
+            })
             .collect();
         captures.sort();
         captures.dedup();

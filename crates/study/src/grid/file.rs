@@ -37,6 +37,7 @@ struct Raw {
     every: usize,
     models: Vec<Model>,
     plans: RawPlans,
+    adaptive: Option<RawAdaptive>,
     pca: RawPca,
     compare: RawCompare,
 }
@@ -48,6 +49,15 @@ struct RawPlans {
     readings: Vec<usize>,
     arc: Vec<usize>,
     distribution: Distribution,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawAdaptive {
+    planes_deg: Vec<f64>,
+    readings: usize,
+    arc: usize,
+    budget_s: Vec<u32>,
 }
 
 #[derive(Deserialize)]
@@ -97,8 +107,7 @@ impl Grid {
         check.number("compare.pairs", pairs, good, "1 … 1e6")?;
         let good = theta_max_deg > 0.0 && theta_max_deg <= 90.0;
         check.number("compare.theta_max_deg", theta_max_deg, good, "above 0 … 90")?;
-        let thin = |list: Vec<usize>| if quick { ends_and_middle(&list) } else { list };
-        let (readings, arcs) = (thin(plans.readings), thin(plans.arc));
+        let (readings, arcs) = (thin(plans.readings, quick), thin(plans.arc, quick));
         let mut cells = Vec::new();
         for planes_deg in plans.planes_deg {
             for &readings in &readings {
@@ -108,10 +117,25 @@ impl Grid {
                         readings,
                         distribution: plans.distribution,
                         arc,
+                        budget_s: None,
                     };
                     plan.job()?;
                     cells.push(plan);
                 }
+            }
+        }
+        if let Some(adaptive) = raw.adaptive {
+            check.list("adaptive.budget_s", &adaptive.budget_s, |n| n > 0, "1 … 86400")?;
+            for budget_s in thin(adaptive.budget_s, quick) {
+                let plan = GridPlan {
+                    planes_deg: adaptive.planes_deg.clone(),
+                    readings: adaptive.readings,
+                    distribution: plans.distribution,
+                    arc: adaptive.arc,
+                    budget_s: Some(budget_s),
+                };
+                plan.job()?;
+                cells.push(plan);
             }
         }
         Ok(Self {
@@ -129,6 +153,11 @@ impl Grid {
         })
     }
 
+    /// The plans that are laid down before.
+    pub(crate) fn fixed(&self) -> impl Iterator<Item = &GridPlan> {
+        self.plans.iter().filter(|plan| plan.budget_s.is_none())
+    }
+
     /// Reads a study file.
     ///
     /// # Errors
@@ -138,7 +167,11 @@ impl Grid {
     }
 }
 
-fn ends_and_middle(list: &[usize]) -> Vec<usize> {
+/// Of a quick study the first, the middle and the last.
+fn thin<T: Copy>(list: Vec<T>, quick: bool) -> Vec<T> {
+    if !quick {
+        return list;
+    }
     let last = list.len() - 1;
     let mut at = vec![0, last / 2, last];
     at.dedup();

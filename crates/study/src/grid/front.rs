@@ -14,6 +14,8 @@ pub(crate) struct Point {
     pub(crate) readings: usize,
     /// Readings asked for of the arc.
     pub(crate) arc: usize,
+    /// Rig seconds within which more was added.
+    pub(crate) budget_s: Option<u32>,
     pub(crate) model: String,
     /// Median of the seconds that the rig took; NaN where there was none.
     pub(crate) rig_s: f64,
@@ -53,7 +55,7 @@ pub(crate) struct Family {
 pub(crate) fn points(rows: &[GridRow], source: Source) -> Vec<Point> {
     let mut groups: BTreeMap<_, Vec<&GridRow>> = BTreeMap::new();
     for row in rows.iter().filter(|row| row.source == source) {
-        let key = (&row.model, &row.planes_deg, row.readings, row.arc);
+        let key = (&row.model, &row.planes_deg, row.readings, row.arc, row.budget_s);
         groups.entry(key).or_default().push(row);
     }
     groups
@@ -64,6 +66,7 @@ pub(crate) fn points(rows: &[GridRow], source: Source) -> Vec<Point> {
                 planes_deg: first.planes_deg.clone(),
                 readings: first.readings,
                 arc: first.arc,
+                budget_s: first.budget_s,
                 model: first.model.clone(),
                 rig_s: median(rows.iter().filter_map(|row| row.rig_s)),
                 fit_s: median(rows.iter().filter_map(|row| row.fit_s)),
@@ -74,10 +77,18 @@ pub(crate) fn points(rows: &[GridRow], source: Source) -> Vec<Point> {
         .collect()
 }
 
-/// The points of the rig by family: baselines are the paper's model at each angle, and the bivariate table.
+/// The points of the rig at which what was added was decided on the way.
+pub(crate) fn adaptive(rows: &[GridRow]) -> Vec<Point> {
+    let mut points = points(rows, Source::Rig);
+    points.retain(|point| point.budget_s.is_some());
+    points
+}
+
+/// The points of the rig with fixed plans by family: baselines are the paper's model at each angle, and the bivariate table.
 pub(crate) fn families(rows: &[GridRow]) -> Vec<Family> {
     let mut families: Vec<Family> = Vec::new();
-    for point in points(rows, Source::Rig) {
+    let fixed = |point: &Point| point.budget_s.is_none();
+    for point in points(rows, Source::Rig).into_iter().filter(fixed) {
         let (name, own) = match point.model.as_str() {
             "separable" => (format!("separable at {}°", point.planes_deg), false),
             "bivariate" => ("bivariate".to_owned(), false),

@@ -14,6 +14,8 @@ pub struct GridPlan {
     pub distribution: Distribution,
     /// Readings of the arc; 0: no arc.
     pub arc: usize,
+    /// Rig seconds within which sweeps are added on the way; `None`: nothing is added.
+    pub budget_s: Option<u32>,
 }
 
 impl GridPlan {
@@ -26,9 +28,10 @@ impl GridPlan {
             .join(" ")
     }
 
-    /// Readings of planes and arc together.
+    /// Readings of planes and arc together; a plan that grows has about four in a second.
     pub fn total(&self) -> usize {
-        self.planes_deg.len() * self.readings + self.arc
+        let fixed = self.planes_deg.len() * self.readings + self.arc;
+        fixed.max(self.budget_s.map_or(0, |seconds| 4 * seconds as usize))
     }
 
     /// The job file that asks for it, checked as every job is.
@@ -46,6 +49,9 @@ impl GridPlan {
         if self.arc > 0 {
             text += &format!("[arc]\nreadings = {}\n", self.arc);
         }
+        if let Some(budget_s) = self.budget_s {
+            text += &format!("[reconstruction]\nmodel = \"planes\"\n[sweep]\nbudget_s = {budget_s}.0\n");
+        }
         let name = format!(
             "{} planes, {} readings, arc {}",
             self.planes(),
@@ -56,9 +62,11 @@ impl GridPlan {
     }
 
     /// Whether a model has something of its own to say on it: one plane's models are made of one plane, and those of
-    /// several are on a single plane what [`Model::Reciprocal`] is.
+    /// several are on a single plane what [`Model::Reciprocal`] is. What is added on the way is chosen for
+    /// [`Model::Planes`].
     pub fn suits(&self, model: Model) -> bool {
         match self.planes_deg.len() {
+            _ if self.budget_s.is_some() => model == Model::Planes,
             1 => model != Model::Planes,
             _ => !model.of_one_plane(),
         }

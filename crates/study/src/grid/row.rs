@@ -25,6 +25,8 @@ pub struct GridRow {
     pub readings: usize,
     /// Readings asked for of the arc.
     pub arc: usize,
+    /// Rig seconds within which more was added on the way.
+    pub budget_s: Option<u32>,
     /// Which model.
     pub model: String,
     /// Readings that counted.
@@ -43,15 +45,19 @@ pub struct GridRow {
     pub p95_rel: f64,
 }
 
+/// What tells a row from every other: material, source, planes, readings, arc, budget and model.
+pub(crate) type Key = (String, Source, String, usize, usize, Option<u32>, String);
+
 impl GridRow {
     /// What tells it from every other row.
-    pub fn key(&self) -> (String, Source, String, usize, usize, String) {
+    pub(crate) fn key(&self) -> Key {
         (
             self.material.clone(),
             self.source,
             self.planes_deg.clone(),
             self.readings,
             self.arc,
+            self.budget_s,
             self.model.clone(),
         )
     }

@@ -8,6 +8,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 use rig::RigFile;
 
+use super::row::Key;
 use super::{Grid, GridPlan, GridRow, Source, baseline, document};
 use crate::judge::Judge;
 use crate::ledger::Ledger;
@@ -80,22 +81,8 @@ pub(crate) fn run(grid: &Grid, directory: &Path, progress: &Progress<'_>) -> Res
 }
 
 /// What is not known yet, the dearest first, so that the cores end together.
-fn tasks<'a>(
-    grid: &'a Grid,
-    known: &HashSet<(String, Source, String, usize, usize, String)>,
-) -> Vec<Task<'a>> {
-    let has = |material: &Material, source, planes: String, readings, arc, model: &str| {
-        let key = (
-            material.name.clone(),
-            source,
-            planes,
-            readings,
-            arc,
-            model.to_owned(),
-        );
-        known.contains(&key)
-    };
-    let mut sets: Vec<&GridPlan> = grid.plans.iter().collect();
+fn tasks<'a>(grid: &'a Grid, known: &HashSet<Key>) -> Vec<Task<'a>> {
+    let mut sets: Vec<&GridPlan> = grid.fixed().collect();
     sets.dedup_by(|a, b| a.planes_deg == b.planes_deg);
     let suited = |plan: &&GridPlan| grid.models.iter().filter(|&&model| plan.suits(model)).count();
     let of_floor: usize = sets.iter().map(suited).sum();
@@ -108,17 +95,17 @@ fn tasks<'a>(
             tasks.push(Task::Floor(material));
         }
         for plan in &grid.plans {
-            let models = || grid.models.iter().filter(|&&model| plan.suits(model));
-            let planes = plan.planes();
-            let whole = models().all(|model| {
-                has(
-                    material,
+            let mut models = grid.models.iter().filter(|&&model| plan.suits(model));
+            let whole = models.all(|model| {
+                known.contains(&(
+                    material.name.clone(),
                     Source::Rig,
-                    planes.clone(),
+                    plan.planes(),
                     plan.readings,
                     plan.arc,
-                    model.name(),
-                )
+                    plan.budget_s,
+                    model.name().to_owned(),
+                ))
             });
             if !whole {
                 tasks.push(Task::Capture(material, plan));
@@ -159,6 +146,7 @@ fn captured(
                 planes_deg: plan.planes(),
                 readings: plan.readings,
                 arc: plan.arc,
+                budget_s: plan.budget_s,
                 model: model.name().to_owned(),
                 taken: measured.readings,
                 exposures: measured.exposures,
