@@ -52,12 +52,16 @@ pub(crate) fn sensitivities(measurements: &[Measurement], rig: &RigFile) -> Vec<
                     let blur = blur(slope, bend, m, rig);
                     if m.deviation.abs() < nearest {
                         nearest = m.deviation.abs();
-                        peak = (blur / f.max(DVec3::splat(f64::MIN_POSITIVE))).clamp(-DVec3::ONE, DVec3::ONE);
+                        peak =
+                            blur / f.max(DVec3::splat(f64::MIN_POSITIVE)) / bends(m.pose.light.rad().cos());
                     }
                     (slope, blur)
                 }
-                // Along the arc the lobe's width does not show; in angle it is that of the planes.
-                _ => (DVec3::ZERO, peak * f),
+                // Along the arc the lobe's width does not show; about the half vector it is that of the planes.
+                _ => {
+                    let blur = (peak * bends(m.pose.light.rad().cos())).clamp(-DVec3::ONE, DVec3::ONE);
+                    (DVec3::ZERO, blur * f)
+                }
             };
             for &i in visit {
                 found[i] = Sensitivity {
@@ -93,13 +97,19 @@ fn derivatives(points: &[Point], at: usize) -> [DVec3; 2] {
 /// the squared half angles times the sum of its second derivatives along and across the plane.
 fn blur(slope: DVec3, bend: DVec3, m: &Measurement, rig: &RigFile) -> DVec3 {
     let [source, detector] = rig.uncertainty.apertures_rad;
-    let cosine = m.pose.light.rad().cos();
+    let cosine = m.pose.light.rad().cos().max(1e-3);
     let across = match m.deviation.abs() {
-        // At the centre of the lobe both are alike.
-        deviation if deviation < source + detector => bend,
-        _ => slope * cosine / m.pose.deviation(),
+        // The limit of what follows.
+        deviation if deviation < source + detector => bend / (cosine * cosine),
+        _ => slope / (cosine * m.pose.deviation()),
     };
     (source * source + detector * detector) / 8.0 * (bend + across)
+}
+
+/// Second derivatives of a lobe about the half vector at its centre, along and across the plane, together, relative to
+/// the one along: an angle along the plane tilts the half vector by a half of it, one across it by that over the cosine.
+fn bends(cosine: f64) -> f64 {
+    1.0 + 1.0 / (cosine * cosine).max(1e-6)
 }
 
 /// The reflectance is divided by the cosine of the angle that was read, and taken to stand at that angle.
