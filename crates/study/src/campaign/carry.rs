@@ -98,7 +98,7 @@ async fn carry_out<B: Bench>(script: &Script) -> Result<Carried, String> {
             Outcome::Done => {
                 return Ok(Carried {
                     executions: execution,
-                    readings: whole(&journal.0, steps, &file, &*specimen)?,
+                    readings: whole(&journal.0, steps, &job, &file, &*specimen)?,
                 });
             }
             Outcome::Stopped => return Err("stopped by nobody".to_owned()),
