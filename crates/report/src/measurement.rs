@@ -1,4 +1,5 @@
 use std::collections::HashMap;
+use std::ops::Range;
 
 use arms::Pose;
 use capture::{Reading, Record, extended_plan};
@@ -23,8 +24,11 @@ pub struct Measurement {
     pub theta_r: f64,
     /// Signed deviation from the mirror direction there; positive towards the normal, negative outwards.
     pub deviation: f64,
-    /// Reflectance, linear RGB in sr⁻¹; `None` with the lamp off; an error where the counts say nothing.
+    /// Reflectance, linear RGB in sr⁻¹; `None` with the lamp off; an error where the counts say nothing. Of a reading
+    /// that counts it is the mean over all exposures of its pose, of each channel by inverse variance.
     pub reflectance: Option<Result<DVec3, Unusable>>,
+    /// How many exposures that is made of; 0 where there is none.
+    pub exposures: usize,
     /// The same in the sensor's own colours, before the colour matrix.
     pub raw: Option<DVec3>,
     /// How sure the reflectance is, as far as this reading can tell.
@@ -61,8 +65,13 @@ pub fn measurements(records: &[Record], rig: &RigFile) -> Vec<Measurement> {
         .filter(|(reading, _)| reading.sweep == Sweep::Reference && reading.accepted);
     let visits: Vec<Taken> = visits.map(|(_, taken)| *taken).collect();
     let reduction = Reduction::new(rig, certificate(records), &all, &visits);
-    let measure = |(reading, taken): &(&Reading, Taken)| {
-        let reflectance = reading.lamp.then(|| reduction.reflectance(taken));
+    let stays = stays(records);
+    let measure = |(i, (reading, taken)): (usize, &(&Reading, Taken))| {
+        let exposures = match reading.accepted {
+            true => &all[together(&stays, i)],
+            false => std::slice::from_ref(taken),
+        };
+        let reflectance = reading.lamp.then(|| reduction.combined(exposures));
         let good = reflectance.and_then(Result::ok);
         let pose = reduction.aligned(reading.measured);
         Measurement {
@@ -71,6 +80,7 @@ pub fn measurements(records: &[Record], rig: &RigFile) -> Vec<Measurement> {
             theta_r: pose.sensor.rad().abs(),
             deviation: pose.deviation() * 1_f64.copysign(pose.sensor.rad()),
             reflectance: reflectance.map(|result| result.map(|good| DVec3::from_array(good.rgb))),
+            exposures: good.map_or(0, |good| good.exposures),
             raw: good.map(|good| DVec3::from_array(good.raw)),
             budget: good.map(|good| good.u),
             u: None,
@@ -79,10 +89,42 @@ pub fn measurements(records: &[Record], rig: &RigFile) -> Vec<Measurement> {
             reading: (*reading).clone(),
         }
     };
-    let mut measurements: Vec<Measurement> = readings.iter().map(measure).collect();
+    let mut measurements: Vec<Measurement> = readings.iter().enumerate().map(measure).collect();
     sharpen(&mut measurements, records);
     expand(&mut measurements, records, rig);
     measurements
+}
+
+/// For each reading of a journal, in its order, the number of the stay at a pose in which it was taken, ascending: as
+/// long as the arms rest there, exposures tell the same. In flight each reading is one by itself.
+fn stays(records: &[Record]) -> Vec<usize> {
+    let mut stays = Vec::new();
+    let mut last: Option<&Reading> = None;
+    for record in records {
+        match record {
+            Record::Begin { .. } => last = None,
+            Record::Reading(reading) => {
+                let rests = |last: &Reading| {
+                    let at_rest = last.swept_rad.is_none() && reading.swept_rad.is_none();
+                    at_rest && last.step == reading.step && last.measured == reading.measured
+                };
+                let before = stays.last().copied().unwrap_or_default();
+                stays.push(if last.is_some_and(rests) {
+                    before
+                } else {
+                    before + 1
+                });
+                last = Some(reading);
+            }
+            _ => {}
+        }
+    }
+    stays
+}
+
+/// The readings of the same stay as the `i`-th.
+fn together(stays: &[usize], i: usize) -> Range<usize> {
+    stays.partition_point(|&stay| stay < stays[i])..stays.partition_point(|&stay| stay <= stays[i])
 }
 
 /// Every reading of a journal, in its order, also as calibrations see it.

@@ -41,6 +41,7 @@ struct Row {
     shadowed: bool,
     light_swept_deg: Option<f64>,
     sensor_swept_deg: Option<f64>,
+    exposures: usize,
 }
 
 impl Row {
@@ -82,13 +83,15 @@ impl Row {
             shadowed: measurement.shadowed,
             light_swept_deg: reading.swept_rad.map(|[light, _]| light.to_degrees()),
             sensor_swept_deg: reading.swept_rad.map(|[_, sensor]| sensor.to_degrees()),
+            exposures: measurement.exposures,
         }
     }
 }
 
 /// Writes readings.csv: one row a reading, in the order in which they were taken; reflectance in sr⁻¹, empty where a
 /// reading has none (lamp off, saturated). `u` is the expanded uncertainty, k = 2; `raw` the reflectance in the sensor's
-/// own colours, `swept` by how much an arm moved within an integration in flight.
+/// own colours, `swept` by how much an arm moved within an integration in flight; `exposures` is how many f is the mean
+/// of: f and u of a reading that counts are of all exposures of its pose, the counts its own.
 ///
 /// # Errors
 /// The medium refused.

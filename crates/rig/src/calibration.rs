@@ -7,6 +7,7 @@ mod dark;
 mod lamp;
 mod line;
 mod measure;
+mod rate;
 mod reduction;
 mod taken;
 #[cfg(test)]

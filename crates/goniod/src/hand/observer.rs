@@ -19,6 +19,8 @@ pub(super) struct Observer {
     /// What the reflectance of a reading rests on: header, first beginning, readings in the dark and of a reference, and
     /// the one that ends each series in the dark, or two series would count as one.
     basis: Vec<Record>,
+    /// The exposures of the present step that are not among them: one that counts is told together with them.
+    beside: Vec<Record>,
     /// The fault that ended the capture.
     pub(super) fault: Option<FaultCode>,
 }
@@ -35,9 +37,12 @@ impl Observer {
             news,
             run: run.to_owned(),
             basis: Vec::new(),
+            beside: Vec::new(),
             fault: None,
         };
-        records.iter().for_each(|record| observer.learn(record));
+        for record in records {
+            observer.learn(record);
+        }
         observer
     }
 
@@ -127,10 +132,16 @@ impl Observer {
                 at: String::new(),
             });
         }
+        let step = |beside: &Record| matches!(beside, Record::Reading(other) if other.step == reading.step);
+        self.beside.retain(step);
+        let known = self.basis.len();
+        self.basis.extend_from_slice(&self.beside);
         self.basis.push(record.clone());
         let measured = report::measurements(&self.basis, &self.shared.rig).pop();
-        self.basis.pop();
-        self.learn(&record);
+        self.basis.truncate(known);
+        if !self.learn(&record) {
+            self.beside.push(record);
+        }
         let nominal = self.shared.rig.calibration.monitor * f64::from(reading.counts.exposure.integration_us);
         self.shared.view.send_modify(|view| {
             view.temperature_c = Some(reading.counts.temperature_c);
@@ -147,7 +158,8 @@ impl Observer {
         }
     }
 
-    fn learn(&mut self, record: &Record) {
+    /// Keeps a record on which the reflectance of others rests; returns whether it is one.
+    fn learn(&mut self, record: &Record) -> bool {
         let rests_on = match record {
             Record::Header(_) => true,
             Record::Begin { .. } => self.basis.len() < 2,
@@ -160,5 +172,6 @@ impl Observer {
         if rests_on {
             self.basis.push(record.clone());
         }
+        rests_on
     }
 }

@@ -2,8 +2,9 @@ use arms::Pose;
 
 use super::certificate::{Certificate, White};
 use super::lamp::{Drift, Lamp};
+use super::rate::Rate;
 use super::{Darks, Filling, MIN_COSINE, MIN_LAMP, Taken, Unusable};
-use crate::{RigFile, Uncertainties};
+use crate::RigFile;
 
 /// From the counts of one run to reflectance: the rig file, the certificate, the run's dark readings and its visits to
 /// the reference pose.
@@ -16,22 +17,24 @@ pub struct Reduction<'a> {
     drift: Drift,
 }
 
-/// BRDF from one reading.
+/// BRDF from one reading, or from several exposures of one pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflectance {
     /// Linear sRGB in sr⁻¹; the sensor's own colours where no colour matrix was measured.
     pub rgb: [f64; 3],
     /// In the sensor's own colours, sr⁻¹.
     pub raw: [f64; 3],
-    /// How sure `rgb` is, as far as one reading can tell.
+    /// How sure `rgb` is, as far as its own counts can tell.
     pub u: Budget,
+    /// How many exposures told it: those in which not every channel was at full scale.
+    pub exposures: usize,
 }
 
 /// Standard uncertainty of a reflectance by its origin, red, green, blue, sr⁻¹. What depends on how the reflectance
 /// varies with the angles is not in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Budget {
-    /// Photons, electrons and the converter, in this reading alone: signal and monitor.
+    /// Photons, electrons and the converter, in these counts alone: signal and monitor.
     pub counting: [f64; 3],
     /// The dark level: the same for all readings of a gain between two dark sets.
     pub dark: [f64; 3],
@@ -43,19 +46,6 @@ pub struct Budget {
     pub linearity: [f64; 3],
     /// Stray light: the same amount of light in all readings.
     pub stray: [f64; 3],
-}
-
-/// Counts per µs at gain ×1 and nominal lamp output.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Rate {
-    pub(crate) rgb: [f64; 3],
-    /// Counts above dark.
-    pub(crate) net: [f64; 3],
-    /// Standard uncertainties: of this reading, of the dark level, of the lamp; linearity, relative.
-    pub(crate) u_counting: [f64; 3],
-    u_dark: [f64; 3],
-    u_lamp: f64,
-    u_linearity: [f64; 3],
 }
 
 impl<'a> Reduction<'a> {
@@ -110,7 +100,22 @@ impl<'a> Reduction<'a> {
     /// # Errors
     /// Counts that say nothing, and why.
     pub fn reflectance(&self, taken: &Taken) -> Result<Reflectance, Unusable> {
-        let pose = self.aligned(taken.pose);
+        self.combined(std::slice::from_ref(taken))
+    }
+
+    /// BRDF from exposures of one pose that overlap: of each channel the mean over those in which it is not at full
+    /// scale, by the inverse of their variances. Their own noise is averaged down and nothing else: dark level, lamp,
+    /// linearity, responsivity and stray light are wrong in all of them alike.
+    ///
+    /// Exposures that say nothing at all are left out.
+    ///
+    /// # Errors
+    /// No exposure says anything, or a channel is at full scale in all of them; why.
+    ///
+    /// # Panics
+    /// If there are no exposures.
+    pub fn combined(&self, exposures: &[Taken]) -> Result<Reflectance, Unusable> {
+        let pose = self.aligned(exposures[0].pose);
         let cosine = match self.file.calibration.filling {
             Filling::Over => pose.light.rad().cos(),
             Filling::Under => pose.sensor.rad().cos(),
@@ -118,7 +123,13 @@ impl<'a> Reduction<'a> {
         if cosine.is_nan() || cosine < MIN_COSINE {
             return Err(Unusable::Grazing);
         }
-        let rate = self.rate(taken)?;
+        let rates: Vec<Rate> = exposures.iter().flat_map(|taken| self.channels(taken)).collect();
+        let usable: Vec<Rate> = rates.into_iter().filter(|rate| rate.full != [true; 3]).collect();
+        let rate = match usable.as_slice() {
+            [] => self.rate(&exposures[0])?,
+            [one] if one.full == [false; 3] => *one,
+            several => Rate::mean(several, &self.file.uncertainty).ok_or(Unusable::Saturated)?,
+        };
         let (stray, u_stray) = self.stray(pose);
         let scale = self.white.responsivity.map(|r| 1.0 / (r * cosine));
         let raw: [f64; 3] = std::array::from_fn(|c| (rate.rgb[c] - stray[c]) * scale[c]);
@@ -132,7 +143,12 @@ impl<'a> Reduction<'a> {
             linearity: relative(rate.u_linearity),
             stray: scaled(u_stray),
         };
-        Ok(self.colour(raw, u))
+        Ok(self.colour(Reflectance {
+            rgb: raw,
+            raw,
+            u,
+            exposures: usable.len(),
+        }))
     }
 
     /// Counts per µs at gain ×1 and nominal lamp output, stray light included.
@@ -140,10 +156,15 @@ impl<'a> Reduction<'a> {
     /// # Errors
     /// Counts that say nothing, and why.
     pub(crate) fn rate(&self, taken: &Taken) -> Result<Rate, Unusable> {
-        let counts = &taken.counts;
-        if counts.saturated {
-            return Err(Unusable::Saturated);
+        match taken.counts.saturated {
+            true => Err(Unusable::Saturated),
+            false => self.channels(taken),
         }
+    }
+
+    /// The same of a reading of which channels may be at full scale, and say nothing.
+    fn channels(&self, taken: &Taken) -> Result<Rate, Unusable> {
+        let counts = &taken.counts;
         let exposure = counts.exposure;
         let dark = self
             .darks
@@ -174,17 +195,24 @@ impl<'a> Reduction<'a> {
         let scale = 1.0 / (gain * time_us * lamp);
         let mut rate = Rate {
             u_lamp,
+            u_monitor,
+            gain,
+            scale,
             ..Rate::default()
         };
+        let full = |c: usize| counts.rgb[c] >= self.file.photometer.full_scale;
+        // Where the photometer calls itself full below that, it does not say which channel is.
+        let which = (0..3).any(full);
         for c in 0..3 {
             let net = f64::from(counts.rgb[c]) - dark.rgb[c];
             let (straight, u_linearity) = self.white.straighten(net, full_scale);
             rate.rgb[c] = straight * scale;
             rate.net[c] = net;
-            let own = known.variance(f64::from(counts.rgb[c]) - dark.offset[c], gain);
-            rate.u_counting[c] = (own * scale * scale + (u_monitor * rate.rgb[c]).powi(2)).sqrt();
+            rate.full[c] = counts.saturated && (full(c) || !which);
             rate.u_dark[c] = dark.u_rgb[c] * scale;
             rate.u_linearity[c] = u_linearity;
+            rate.current[c] = dark.rgb[c] - dark.offset[c];
+            rate.u_counting[c] = rate.variance(c, rate.rgb[c], known).sqrt();
         }
         Ok(rate)
     }
@@ -200,9 +228,9 @@ impl<'a> Reduction<'a> {
         }
     }
 
-    fn colour(&self, raw: [f64; 3], u: Budget) -> Reflectance {
+    fn colour(&self, sensor: Reflectance) -> Reflectance {
         let Some(colour) = &self.certificate.colour else {
-            return Reflectance { rgb: raw, raw, u };
+            return sensor;
         };
         let row = |of: &[f64; 3], row: &[f64; 3]| row.iter().zip(of).map(|(m, x)| m * x).sum::<f64>();
         let squares = |of: &[f64; 3], row: &[f64; 3]| {
@@ -210,9 +238,9 @@ impl<'a> Reduction<'a> {
             sum.sqrt()
         };
         let mixed = |of: [f64; 3]| colour.matrix.map(|line| squares(&of, &line));
+        let u = sensor.u;
         Reflectance {
-            rgb: colour.matrix.map(|line| row(&raw, &line)),
-            raw,
+            rgb: colour.matrix.map(|line| row(&sensor.raw, &line)),
             u: Budget {
                 counting: mixed(u.counting),
                 dark: mixed(u.dark),
@@ -221,17 +249,7 @@ impl<'a> Reduction<'a> {
                 linearity: mixed(u.linearity),
                 stray: mixed(u.stray),
             },
+            ..sensor
         }
-    }
-}
-
-impl Uncertainties {
-    /// Variance of counts above the photometer's offset, taken with a gain: shot noise, converter, rounding.
-    fn variance(&self, counts: f64, gain: f64) -> f64 {
-        let shot = match self.electrons_per_count {
-            0.0 => 0.0,
-            electrons => gain * counts.max(0.0) / electrons,
-        };
-        shot + self.read_noise_counts.powi(2) + 1.0 / 12.0
     }
 }

@@ -262,6 +262,85 @@ fn a_colour_matrix_undoes_cross_talk() {
     );
 }
 
+/// The counts of an exposure of a light that gives `rates` counts per µs at ×1; what is beyond full scale is cut off.
+fn exposed(file: &RigFile, rates: [f64; 3], integration_us: u32, gain: Gain) -> Taken {
+    let time_us = f64::from(integration_us);
+    let full_scale = file.photometer.full_scale;
+    let rgb = rates.map(|rate| ((rate * time_us * gain.factor()).round() as u32).min(full_scale));
+    let counts = Counts {
+        rgb,
+        monitor: (MONITOR * time_us).round() as u32,
+        exposure: Exposure { integration_us, gain },
+        saturated: rgb.contains(&full_scale),
+        ..counts([0; 3], 0, gain)
+    };
+    taken(Pose::from_deg(0.0, 40.0), true, counts)
+}
+
+#[test]
+fn overlapping_exposures_are_averaged_by_inverse_variance() {
+    let rig = file("");
+    let reduction = Reduction::new(&rig, None, &nothing(), &[]);
+    // The second one is a little lower, so that the weights show.
+    let pair = [
+        exposed(&rig, [0.2, 0.4, 0.1], 20_000, Gain::X1),
+        exposed(&rig, [0.198, 0.396, 0.099], 50_000, Gain::X16),
+    ];
+    let [short, long] = pair.map(|one| reduction.reflectance(&one).unwrap());
+    let both = reduction.combined(&pair).unwrap();
+    assert_eq!((short.exposures, both.exposures), (1, 2));
+    for c in 0..3 {
+        let (a, b) = (short.u.counting[c], long.u.counting[c]);
+        let u = a.recip().hypot(b.recip()).recip();
+        assert!((both.u.counting[c] / u - 1.0).abs() < 0.01, "{both:?}, not {u}");
+        let mean = u * u * (short.rgb[c] / (a * a) + long.rgb[c] / (b * b));
+        let apart = short.rgb[c] - long.rgb[c];
+        assert!((both.rgb[c] - mean).abs() < 0.02 * apart, "{both:?}, not {mean}");
+        // The dark level and the reference are as wrong in one as in the other.
+        let dark = [short.u.dark[c], long.u.dark[c]];
+        assert!(both.u.dark[c] >= dark[1] && both.u.dark[c] <= dark[0], "{both:?}");
+        let relative = |of: Reflectance| of.u.reference[c] / of.rgb[c];
+        assert!((relative(both) / relative(short) - 1.0).abs() < 1e-12, "{both:?}");
+        assert_eq!(both.u.stray[c], short.u.stray[c]);
+    }
+}
+
+#[test]
+fn a_channel_at_full_scale_is_taken_from_the_other_exposure_alone() {
+    let rig = file("");
+    let reduction = Reduction::new(&rig, None, &nothing(), &[]);
+    let rates = [300.0, 300.0, 0.3];
+    let short = exposed(&rig, rates, 1_000, Gain::X1);
+    let long = exposed(&rig, rates, 100_000, Gain::X1);
+    assert!(long.counts.saturated);
+    assert_eq!(reduction.reflectance(&long), Err(Unusable::Saturated));
+    let alone = reduction.reflectance(&short).unwrap();
+    for order in [[short, long], [long, short]] {
+        let both = reduction.combined(&order).unwrap();
+        assert!((both.rgb[0] / alone.rgb[0] - 1.0).abs() < 1e-12, "{both:?}");
+        assert!((both.u.counting[0] / alone.u.counting[0] - 1.0).abs() < 1e-12);
+        assert!(
+            (both.rgb[2] / (0.3 / RESPONSIVITY[2]) - 1.0).abs() < 1e-4,
+            "{both:?}"
+        );
+        assert!(both.u.counting[2] < 0.1 * alone.u.counting[2], "{both:?}");
+    }
+    // What is full in every exposure stays unknown, and one that is all full says nothing of the others.
+    assert_eq!(reduction.combined(&[long, long]), Err(Unusable::Saturated));
+    let blind = exposed(&rig, [300.0; 3], 100_000, Gain::X1);
+    assert_eq!(reduction.combined(&[blind, short]), Ok(alone));
+    assert_eq!(reduction.combined(&[blind]), Err(Unusable::Saturated));
+    // Full, and it does not say which channel.
+    let unsure = Taken {
+        counts: Counts {
+            saturated: true,
+            ..short.counts
+        },
+        ..short
+    };
+    assert_eq!(reduction.combined(&[unsure]), Err(Unusable::Saturated));
+}
+
 proptest! {
     /// Counts made of a reflectance by the formula, rounded, give it back within the rounding.
     #[test]
