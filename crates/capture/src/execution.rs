@@ -17,8 +17,8 @@ mod suspend;
 
 pub(crate) use shutdown::Interrupt;
 
-/// Most exposures of one reading in one execution: from one end of the range to the other takes six, by a factor of
-/// about 16 each.
+/// Most exposures of one reading in one execution until it counts: from one end of the range to the other takes six, by
+/// a factor of about 16 each. One more may follow for its faintest channel.
 pub(crate) const MAX_EXPOSURES: u32 = 8;
 /// Longest time between two looks at a rig that waits, and at what the operator wants.
 const LOOK: Duration = Duration::from_millis(200);
@@ -72,7 +72,7 @@ impl<'a, R: Rig> Execution<'a, R> {
     ) -> Self {
         let mut done = vec![false; plan.steps.len()];
         let mut attempts = vec![0; plan.steps.len()];
-        let mut ranging = Ranging::new(&file.photometer);
+        let mut ranging = Ranging::new(file);
         for reading in readings(journal.records()) {
             // What refers to no step of the plan cannot count for one.
             let Some(attempts) = attempts.get_mut(reading.step) else {
@@ -259,7 +259,7 @@ impl<'a, R: Rig> Execution<'a, R> {
         Ok(())
     }
 
-    /// One step: lamp, motion, and exposures until one is accepted.
+    /// One step: lamp, motion, exposures until one is accepted, and one more where a channel is too faint in that.
     async fn step(&mut self, step: &Step) -> Result<(), Interrupt<R::Error>> {
         self.emit(Event::Step {
             step: step.index,
@@ -277,41 +277,69 @@ impl<'a, R: Rig> Execution<'a, R> {
             gain: Gain::ALL[usize::from(gain).min(Gain::ALL.len() - 1)],
         });
         let mut exposure = fixed.unwrap_or_else(|| self.ranging.first(step.sweep, step.pose()));
+        let mut beside = None;
         for left in (0..MAX_EXPOSURES).rev() {
-            let counts = self.drive.expose(exposure).await?;
-            if step.lamp && self.lamp_is_out(&counts) {
-                return Err(Interrupt::Lamp);
-            }
-            if step.lamp && self.file.visits.lamp == Lamp::Monitor {
-                self.note_lamp(&counts);
-            }
+            let counts = self.expose(step, exposure).await?;
             let better = match fixed {
                 None if left > 0 => self.ranging.better(&counts),
                 _ => None,
             };
-            let mut reading = Reading {
-                step: step.index,
-                attempt: self.attempts[step.index],
-                accepted: better.is_none(),
-                sweep: step.sweep,
-                lamp: step.lamp,
-                goal: step.pose(),
-                measured,
-                counts,
-                device_ticks: self.clock.unwrap(counts.ticks),
-                retries: self.drive.retries() - retries,
-                flags: Vec::new(),
-                swept_rad: None,
-            };
-            reading.flags = self.flags(&reading);
-            retries = self.drive.retries();
-            self.record(reading, step).await?;
+            let accepted = better.is_none();
+            retries = self.rested(step, measured, counts, accepted, retries).await?;
             match better {
                 Some(better) => exposure = better,
-                None => break,
+                None => {
+                    beside = self.ranging.beside(&counts).filter(|_| fixed.is_none());
+                    break;
+                }
             }
         }
+        if let Some(beside) = beside {
+            let counts = self.expose(step, beside).await?;
+            self.rested(step, measured, counts, false, retries).await?;
+        }
         Ok(())
+    }
+
+    /// Exposes, and looks at the lamp.
+    async fn expose(&mut self, step: &Step, exposure: Exposure) -> Result<Counts, Interrupt<R::Error>> {
+        let counts = self.drive.expose(exposure).await?;
+        if step.lamp && self.lamp_is_out(&counts) {
+            return Err(Interrupt::Lamp);
+        }
+        if step.lamp && self.file.visits.lamp == Lamp::Monitor {
+            self.note_lamp(&counts);
+        }
+        Ok(counts)
+    }
+
+    /// Records a reading of arms at rest, `retries` being the requests repeated before it; returns those after it.
+    async fn rested(
+        &mut self,
+        step: &Step,
+        measured: Pose,
+        counts: Counts,
+        accepted: bool,
+        retries: u32,
+    ) -> Result<u32, Interrupt<R::Error>> {
+        let now = self.drive.retries();
+        let mut reading = Reading {
+            step: step.index,
+            attempt: self.attempts[step.index],
+            accepted,
+            sweep: step.sweep,
+            lamp: step.lamp,
+            goal: step.pose(),
+            measured,
+            counts,
+            device_ticks: self.clock.unwrap(counts.ticks),
+            retries: now - retries,
+            flags: Vec::new(),
+            swept_rad: None,
+        };
+        reading.flags = self.flags(&reading);
+        self.record(reading, step).await?;
+        Ok(now)
     }
 
     /// Drives to a step's pose; from wherever the arms are where its own path does not lead on.

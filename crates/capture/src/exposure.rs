@@ -1,5 +1,5 @@
 use arms::Pose;
-use rig::{Counts, Exposure, Gain, PhotometerSettings};
+use rig::{Counts, Exposure, Gain, PhotometerSettings, RigFile};
 use sweep::Sweep;
 
 use crate::Reading;
@@ -16,6 +16,9 @@ const STEEPEST: f64 = 8.0;
 const ALMOST_FULL: f64 = 0.95;
 /// An exposure that differs less than this from the last one is not worth another reading.
 const WORTH_IT: f64 = 1.1;
+/// A channel is exposed again beside a brighter one only where that leaves at most this share of its noise: the same
+/// exposure once more, for the same time or less, would leave 0.7 of every channel's.
+const QUIETER: f64 = 0.5;
 
 /// Chooses exposures from the readings before.
 ///
@@ -23,6 +26,7 @@ const WORTH_IT: f64 = 1.1;
 /// the aim within the longest integration is used, since light collected longer is less noisy than light amplified.
 #[derive(Clone, Debug)]
 pub(crate) struct Ranging<'a> {
+    file: &'a RigFile,
     photometer: &'a PhotometerSettings,
     /// Brightest channel of dark readings: gain, integration in µs, counts.
     dark: Vec<(Gain, f64, f64)>,
@@ -31,9 +35,10 @@ pub(crate) struct Ranging<'a> {
 }
 
 impl<'a> Ranging<'a> {
-    pub(crate) fn new(photometer: &'a PhotometerSettings) -> Self {
+    pub(crate) fn new(file: &'a RigFile) -> Self {
         Self {
-            photometer,
+            file,
+            photometer: &file.photometer,
             dark: Vec::new(),
             lit: Vec::new(),
         }
@@ -75,6 +80,30 @@ impl<'a> Ranging<'a> {
             self.dim(counts) && change > WORTH_IT
         };
         worth_it.then_some(next)
+    }
+
+    /// An exposure beside the one of `counts`, which counts, for its faintest channel: where that has fewer counts than
+    /// the rig file calls enough, since a brighter one leaves no time for more. There the brighter one may saturate; each
+    /// channel is taken from the exposures that show it. `None` where that would leave no more than a little less noise:
+    /// where the time is spent already, amplification does not help against the noise of light.
+    pub(crate) fn beside(&self, counts: &Counts) -> Option<Exposure> {
+        let dark = self.dark_level(counts.exposure);
+        let faintest = f64::from(counts.rgb.into_iter().fold(u32::MAX, u32::min)) - dark;
+        if counts.saturated || self.dim(counts) || faintest >= f64::from(self.photometer.enough) {
+            return None;
+        }
+        // Below one count only the noise is known.
+        let rate = faintest.max(1.0) / sensitivity(counts.exposure);
+        let next = self.aim(rate);
+        let noise = |exposure: Exposure| {
+            let counts = rate * sensitivity(exposure);
+            self.file
+                .uncertainty
+                .variance(counts, exposure.gain.factor())
+                .sqrt()
+                / counts
+        };
+        (noise(next) <= QUIETER * noise(counts.exposure)).then_some(next)
     }
 
     /// Whether the brightest channel has fewer counts above dark than the rig file calls enough.
@@ -196,29 +225,31 @@ mod tests {
 
     const DARK: f64 = 64.0;
 
-    fn photometer(text: &str) -> PhotometerSettings {
+    fn rig(text: &str) -> RigFile {
         let text = format!("[photometer]\n{text}");
-        RigFile::parse(&text, "test.toml".as_ref())
-            .expect("a good rig file")
-            .photometer
+        RigFile::parse(&text, "test.toml".as_ref()).expect("a good rig file")
     }
 
     /// What a photometer without noise says of a light with this rate.
-    fn counts(p: &PhotometerSettings, rate: f64, exposure: Exposure) -> Counts {
-        let full = f64::from(p.full_scale);
-        let raw = (DARK + rate * sensitivity(exposure)).round();
+    fn counts(file: &RigFile, rate: f64, exposure: Exposure) -> Counts {
+        counts_of(file, [rate; 3], exposure)
+    }
+
+    fn counts_of(file: &RigFile, rates: [f64; 3], exposure: Exposure) -> Counts {
+        let full = f64::from(file.photometer.full_scale);
+        let raw = rates.map(|rate| (DARK + rate * sensitivity(exposure)).round());
         Counts {
-            rgb: [raw.min(full) as u32, 0, 0],
+            rgb: raw.map(|raw| raw.min(full) as u32),
             monitor: 0,
             exposure,
-            saturated: raw >= full,
+            saturated: raw.into_iter().any(|raw| raw >= full),
             sequence: 0,
             ticks: 0,
             temperature_c: 25,
         }
     }
 
-    fn reading(p: &PhotometerSettings, lamp: bool, light_deg: f64, rate: f64, exposure: Exposure) -> Reading {
+    fn reading(file: &RigFile, lamp: bool, light_deg: f64, rate: f64, exposure: Exposure) -> Reading {
         let pose = Pose::from_deg(light_deg, 60.0);
         Reading {
             step: 0,
@@ -228,7 +259,7 @@ mod tests {
             lamp,
             goal: pose,
             measured: pose,
-            counts: counts(p, rate, exposure),
+            counts: counts(file, rate, exposure),
             device_ticks: 0,
             retries: 0,
             flags: Vec::new(),
@@ -236,22 +267,23 @@ mod tests {
         }
     }
 
-    fn with_darks(p: &PhotometerSettings) -> Ranging<'_> {
-        let mut ranging = Ranging::new(p);
+    fn with_darks(file: &RigFile) -> Ranging<'_> {
+        let mut ranging = Ranging::new(file);
+        let p = &file.photometer;
         for gain in Gain::ALL {
             for integration_us in [p.integration_min_us, p.integration_max_us] {
-                ranging.learn(&reading(p, false, 0.0, 0.0, Exposure { integration_us, gain }));
+                ranging.learn(&reading(file, false, 0.0, 0.0, Exposure { integration_us, gain }));
             }
         }
         ranging
     }
 
     /// Exposes until there is nothing better, and says how often.
-    fn settle(ranging: &Ranging<'_>, p: &PhotometerSettings, rate: f64, first: Exposure) -> (Counts, usize) {
-        let mut last = counts(p, rate, first);
+    fn settle(ranging: &Ranging<'_>, rate: f64, first: Exposure) -> (Counts, usize) {
+        let mut last = counts(ranging.file, rate, first);
         let mut exposures = 1;
         while let Some(better) = ranging.better(&last) {
-            last = counts(p, rate, better);
+            last = counts(ranging.file, rate, better);
             exposures += 1;
             assert!(
                 exposures <= 20,
@@ -263,8 +295,9 @@ mod tests {
 
     #[test]
     fn the_weakest_gain_that_reaches_the_aim_is_used() {
-        let p = photometer("");
-        let ranging = with_darks(&p);
+        let file = rig("");
+        let p = &file.photometer;
+        let ranging = with_darks(&file);
         let aim = f64::from(p.full_scale) * p.aim;
         let table = [
             (aim / 100_000.0, Gain::X1, 100_000),
@@ -286,12 +319,12 @@ mod tests {
     /// On the flank of a lobe each reading is brighter than the last by the same factor.
     #[test]
     fn a_steady_rise_is_foreseen_and_a_fall_is_not() {
-        let p = photometer("");
+        let file = rig("");
         for (factor, expected) in [(1.5, 1.5), (0.5, 1.0), (100.0, STEEPEST)] {
-            let mut ranging = with_darks(&p);
+            let mut ranging = with_darks(&file);
             for (i, light_deg) in [-40.0, -41.0].into_iter().enumerate() {
                 let rate = f64::powi(factor, i as i32);
-                ranging.learn(&reading(&p, true, light_deg, rate, ranging.aim(rate)));
+                ranging.learn(&reading(&file, true, light_deg, rate, ranging.aim(rate)));
             }
             let next = ranging
                 .predict(Sweep::Plane(0), Pose::from_deg(-42.0, 60.0))
@@ -302,10 +335,10 @@ mod tests {
 
     #[test]
     fn a_sweep_begins_with_what_the_nearest_reading_of_another_said() {
-        let p = photometer("");
-        let mut ranging = with_darks(&p);
+        let file = rig("");
+        let mut ranging = with_darks(&file);
         for (light_deg, rate) in [(-80.0, 0.5), (-20.0, 7.0)] {
-            ranging.learn(&reading(&p, true, light_deg, rate, ranging.aim(rate)));
+            ranging.learn(&reading(&file, true, light_deg, rate, ranging.aim(rate)));
         }
         let expected = ranging.aim(7.0);
         let first = ranging.first(Sweep::Arc, Pose::from_deg(-30.0, 50.0));
@@ -314,6 +347,24 @@ mod tests {
             first.integration_us.abs_diff(expected.integration_us) < 10,
             "{first:?}, {expected:?}"
         );
+    }
+
+    #[test]
+    fn a_faint_channel_beside_a_bright_one_is_exposed_for_itself() {
+        let file = rig("");
+        let ranging = with_darks(&file);
+        // A lobe that leaves 52 µs, and a channel a thousand times fainter than it.
+        let lobe = counts_of(&file, [5000.0, 5000.0, 5.0], ranging.aim(5000.0));
+        let next = ranging.beside(&lobe).expect("more time for the blue channel");
+        let beside = counts_of(&file, [5000.0, 5000.0, 5.0], next);
+        assert!(beside.saturated, "{beside:?}");
+        assert!(beside.rgb[2] > file.photometer.enough && beside.rgb[2] < file.photometer.full_scale);
+        // The time is all spent, and blue has the light that there is; or it has enough anyway.
+        for rates in [[0.35, 0.035, 0.0012], [5000.0, 50.0, 50.0]] {
+            let counts = counts_of(&file, rates, ranging.aim(rates[0]));
+            assert_eq!(ranging.beside(&counts), None, "{counts:?}");
+        }
+        assert_eq!(ranging.beside(&beside), None, "what does not count is left");
     }
 
     proptest! {
@@ -328,13 +379,14 @@ mod tests {
             enough in 0_u32..1_048_575,
         ) {
             let max_us = min_us.saturating_mul(span).min(10_000_000);
-            let p = photometer(&format!(
+            let file = rig(&format!(
                 "integration_min_us = {min_us}\nintegration_max_us = {max_us}\naim = {aim}\nenough = {enough}"
             ));
-            let ranging = with_darks(&p);
+            let p = &file.photometer;
+            let ranging = with_darks(&file);
             let integration_us = min_us + (start * f64::from(max_us - min_us)) as u32;
             let first = Exposure { integration_us, gain: Gain::ALL[gain] };
-            let (last, exposures) = settle(&ranging, &p, 10_f64.powf(log_rate), first);
+            let (last, exposures) = settle(&ranging, 10_f64.powf(log_rate), first);
             prop_assert!(exposures <= crate::execution::MAX_EXPOSURES as usize, "{exposures} exposures");
             let exposure = last.exposure;
             prop_assert!((min_us..=max_us).contains(&exposure.integration_us));

@@ -24,7 +24,8 @@ pub struct Reading {
     pub step: usize,
     /// Exposures of this step before this one.
     pub attempt: u32,
-    /// Whether this is the one that counts for its step; the others were saturated or too dim.
+    /// Whether this is the one that counts for its step. Those before it were saturated or too dim; one after it is there
+    /// for a channel that was too faint in it.
     pub accepted: bool,
     /// What it belongs to.
     pub sweep: Sweep,
