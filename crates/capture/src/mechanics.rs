@@ -2,6 +2,7 @@ use arms::{ArmAngle, Pose};
 use rig::{Approach, Lamp, Port, RigFile};
 use sweep::Mechanics;
 
+use crate::execution::MAX_EXPOSURES;
 use crate::exposure::brief;
 
 /// What a planner needs to know of the rig in a rig file, with the arms standing at `start`.
@@ -27,6 +28,8 @@ pub fn mechanics(rig: &RigFile, start: Option<Pose>) -> Mechanics {
             rig.photometer.integration_min_us,
             rig.photometer.integration_max_us,
         ],
+        // And one for the faintest channel.
+        exposures: MAX_EXPOSURES + 1,
         transaction_s: transaction_s(rig),
         flight_s: flight_s(rig),
         warm_up_s: rig.photometer.lamp_warm_up.as_secs_f64(),

@@ -2,7 +2,7 @@ use std::path::Path;
 
 use goniod::Order;
 use serde_json::json;
-use sweep::{Plan, Sweep, Until};
+use sweep::{Light, Plan, Sweep, Until};
 
 use crate::print;
 use crate::progress::clock;
@@ -19,6 +19,7 @@ pub(crate) fn plan(job: &Path, rig: Option<&Path>, as_json: bool) -> anyhow::Res
             "seconds": plan.seconds(),
             "overhead_s": plan.overhead_s,
             "readings": plan.steps.len(),
+            "light": order.light(&plan),
             "left_out": plan.left_out,
             "open": plan.open,
             "until": order.job.until,
@@ -26,7 +27,7 @@ pub(crate) fn plan(job: &Path, rig: Option<&Path>, as_json: bool) -> anyhow::Res
         }))?;
         return Ok(());
     }
-    list(&plan)?;
+    list(&plan, order.light(&plan))?;
     if let Some(until) = order.job.until {
         print::line(then(until))?;
     }
@@ -48,6 +49,17 @@ fn then(until: Until) -> String {
     )
 }
 
+/// What the choice of exposures may make of the time, in words.
+fn exposures(light: Light) -> String {
+    format!(
+        "           {} of a bright specimen, {} of a dark one; {:.2} s more for each reading exposed again; at worst {} in all",
+        clock(light.least_s),
+        clock(light.most_s),
+        light.again_s,
+        clock(light.worst_s)
+    )
+}
+
 /// A step for machines, in degrees.
 fn step(step: &sweep::Step) -> serde_json::Value {
     let pose = step.pose();
@@ -65,7 +77,7 @@ fn step(step: &sweep::Step) -> serde_json::Value {
 }
 
 /// A plan for people: each sweep in a line, then what is left out.
-fn list(plan: &Plan) -> std::io::Result<()> {
+fn list(plan: &Plan, light: Light) -> std::io::Result<()> {
     let mut sweeps: Vec<(Sweep, bool, usize, f64)> = Vec::new();
     for step in &plan.steps {
         match sweeps.last_mut().filter(|sweep| sweep.0 == step.sweep) {
@@ -98,6 +110,13 @@ fn list(plan: &Plan) -> std::io::Result<()> {
         plan.steps.len(),
         clock(plan.seconds())
     ))?;
+    print::line(format_args!(
+        "{:<10} {:>5} readings {:>12}",
+        "its light",
+        light.readings,
+        clock(light.foreseen_s)
+    ))?;
+    print::line(exposures(light))?;
     for left_out in &plan.left_out {
         let saved = match left_out.seconds {
             0.0 => String::new(),

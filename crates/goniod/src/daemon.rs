@@ -109,10 +109,12 @@ impl Daemon {
     /// A job file that is wrong, or that this rig cannot do.
     pub async fn plan(&self, job: &str) -> Result<PlanView, Refusal> {
         let order = self.order(job.to_owned(), "job file".to_owned()).await?;
-        blocking(move || order.plan(None))
-            .await?
-            .map(|plan| PlanView::from(&plan))
-            .map_err(|error| Refusal::invalid(&error))
+        blocking(move || {
+            let plan = order.plan(None)?;
+            Ok(PlanView::new(&plan, order.light(&plan)))
+        })
+        .await?
+        .map_err(|error: DaemonError| Refusal::invalid(&error))
     }
 
     /// Reads a job file and checks that this rig can do it.

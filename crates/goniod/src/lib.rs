@@ -43,6 +43,6 @@ pub use state::JobState;
 pub use status::Status;
 pub use store::{Sqlite, Store, StoreError};
 pub use view::{
-    Activity, ArmView, FaultCode, FaultView, LeftOutView, PlanView, Progress, ReadingView, RigView, RunView,
-    SweepView,
+    Activity, ArmView, FaultCode, FaultView, LeftOutView, LightView, PlanView, Progress, ReadingView,
+    RigView, RunView, SweepView,
 };

@@ -4,7 +4,7 @@ use std::time::SystemTime;
 use arms::Pose;
 use capture::Header;
 use rig::{Certificate, RigFile};
-use sweep::{Job, Plan};
+use sweep::{Job, Light, Plan};
 use ulid::Ulid;
 
 use crate::certificates::Certificates;
@@ -98,6 +98,11 @@ impl Order {
     /// What of the job this rig cannot do, or that the arms stand where no motion may begin.
     pub fn plan(&self, start: Option<Pose>) -> Result<Plan, DaemonError> {
         Ok(sweep::plan(&self.job, &capture::mechanics(&self.rig, start))?)
+    }
+
+    /// What the choice of exposures may make of a plan's time on this rig.
+    pub fn light(&self, plan: &Plan) -> Light {
+        Light::new(plan, &capture::mechanics(&self.rig, None))
     }
 }
 

@@ -4,7 +4,7 @@ use arms::Arm;
 use report::Measurement;
 use rig::RigFile;
 use serde::{Deserialize, Serialize};
-use sweep::Plan;
+use sweep::{Light, Plan};
 use utoipa::ToSchema;
 
 use crate::JobId;
@@ -274,6 +274,8 @@ pub struct PlanView {
     pub seconds: f64,
     /// Readings by sweep, in the order in which they are taken.
     pub sweeps: Vec<SweepView>,
+    /// What the choice of exposures may make of the seconds.
+    pub light: LightView,
     /// What is left out and why.
     pub left_out: Vec<LeftOutView>,
     /// Whether more may be added on the way, by what the readings say: then readings and seconds are those of the first
@@ -290,6 +292,36 @@ pub struct SweepView {
     pub readings: usize,
 }
 
+/// What the choice of exposures may make of a plan's time, seconds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, ToSchema)]
+pub struct LightView {
+    /// Readings whose exposure is chosen on the way.
+    pub readings: usize,
+    /// Integration as planned; in flight with what the bus needs between two.
+    pub foreseen_s: f64,
+    /// The same if the shortest integration did for every reading.
+    pub least_s: f64,
+    /// The same if every reading took the longest.
+    pub most_s: f64,
+    /// What another exposure of one reading, saturated or too dim the first time, is expected to add.
+    pub again_s: f64,
+    /// The whole plan if every reading were exposed as often as may be, for the longest time.
+    pub worst_s: f64,
+}
+
+impl From<Light> for LightView {
+    fn from(light: Light) -> Self {
+        Self {
+            readings: light.readings,
+            foreseen_s: light.foreseen_s,
+            least_s: light.least_s,
+            most_s: light.most_s,
+            again_s: light.again_s,
+            worst_s: light.worst_s,
+        }
+    }
+}
+
 /// What a plan leaves out.
 #[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
 pub struct LeftOutView {
@@ -303,8 +335,9 @@ pub struct LeftOutView {
     pub seconds: f64,
 }
 
-impl From<&Plan> for PlanView {
-    fn from(plan: &Plan) -> Self {
+impl PlanView {
+    /// Of a plan and its light.
+    pub(crate) fn new(plan: &Plan, light: Light) -> Self {
         let mut sweeps: Vec<SweepView> = Vec::new();
         for step in &plan.steps {
             let sweep = step.sweep.to_string();
@@ -323,6 +356,7 @@ impl From<&Plan> for PlanView {
             readings: plan.steps.len(),
             seconds: plan.seconds(),
             sweeps,
+            light: light.into(),
             left_out: left_out.collect(),
             open: plan.open,
         }

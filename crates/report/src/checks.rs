@@ -143,7 +143,10 @@ pub(crate) fn bus(run: &Run) -> Check {
     let again = taken - accepted;
     let repeated = match again {
         0 => "none was taken again".to_owned(),
-        n => format!("{n} more were taken again with another exposure"),
+        n => format!(
+            "{n} more were taken with another exposure, {:.1} s of light",
+            run.seconds.again
+        ),
     };
     Check {
         name: "readings",

@@ -124,9 +124,21 @@ pub struct Seconds {
     pub total: f64,
     /// Per sweep: from the reading before, or the start, to each of its readings; "end": from the last one on.
     pub phases: BTreeMap<String, f64>,
+    /// Integration, of all readings.
+    pub light: f64,
+    /// Of that, exposures beside those that count: saturated, too dim, or for a channel that was too faint.
+    pub again: f64,
 }
 
 impl Seconds {
+    fn expose(&mut self, reading: &Reading) {
+        let seconds = reading.counts.exposure.duration().as_secs_f64();
+        self.light += seconds;
+        if !reading.accepted {
+            self.again += seconds;
+        }
+    }
+
     fn add(&mut self, phase: String, from_ticks: u64, to_ticks: u64) {
         // A photometer that was switched off in between starts its clock again.
         let seconds = to_ticks.saturating_sub(from_ticks) as f64 * TICK_S;
@@ -231,6 +243,7 @@ impl Run {
     }
 
     fn count(&mut self, reading: &Reading) {
+        self.seconds.expose(reading);
         self.readings.taken += 1;
         self.readings.accepted += usize::from(reading.accepted);
         let poor = |flag: &Flag| matches!(flag, Flag::Saturated | Flag::Dim);

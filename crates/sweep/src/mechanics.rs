@@ -22,6 +22,8 @@ pub struct Mechanics {
     pub settle_s: f64,
     /// Shortest and longest integration, µs.
     pub integration_us: [u32; 2],
+    /// Most exposures of one reading.
+    pub exposures: u32,
     /// Expected time on the bus and on the host for each reading, s.
     pub transaction_s: f64,
     /// Expected seconds of one reading in flight: its light, and what the bus needs between two.

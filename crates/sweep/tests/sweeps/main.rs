@@ -37,6 +37,7 @@ fn mechanics() -> Mechanics {
         overshoot_rad: 1.0_f64.to_radians(),
         settle_s: 0.02,
         integration_us: [100, 100_000],
+        exposures: 9,
         transaction_s: 0.006,
         flight_s: 0.009,
         warm_up_s: 0.2,

@@ -1,5 +1,5 @@
 use arms::{Arm, ArmAngle, Pose};
-use sweep::{Mechanics, Step, Sweep, SweepError, plan, way};
+use sweep::{Light, Mechanics, Step, Sweep, SweepError, plan, way};
 
 use crate::{QUICKSTART, job, mechanics, poses, steps};
 
@@ -347,5 +347,40 @@ fn without_a_known_start_the_first_way_is_not_timed() {
         next.path,
         [first],
         "dark readings are taken where the first sweep begins"
+    );
+}
+
+#[test]
+fn the_choice_of_exposures_has_its_price_in_the_plan() {
+    let mechanics = mechanics();
+    let plan = plan(&job(QUICKSTART), &mechanics).unwrap();
+    let light = Light::new(&plan, &mechanics);
+    let dark_s: f64 = steps(&plan, Sweep::Dark)
+        .map(|step| f64::from(step.exposure.expect("fixed").1) * 1e-6)
+        .sum();
+    let lit = plan.steps.iter().filter(|step| step.lamp).count();
+    assert_eq!(light.readings, lit);
+    let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
+    assert!(near(light.least_s, dark_s + lit as f64 * 1e-4), "{light:?}");
+    assert!(near(light.most_s, dark_s + lit as f64 * 0.1), "{light:?}");
+    assert!(
+        light.least_s < light.foreseen_s && light.foreseen_s < light.most_s,
+        "{light:?}"
+    );
+    assert!(light.again_s > 0.006 && light.again_s < 0.106, "{light:?}");
+    // Motion, settling and the dark as planned, and nine of the longest for each reading.
+    let rest_s = plan.seconds() - lit as f64 * light.again_s;
+    assert!(
+        near(light.worst_s, rest_s + lit as f64 * 9.0 * 0.106),
+        "{light:?}"
+    );
+    // What is flown may all have to be taken again.
+    let fly = QUICKSTART.replace("mode = \"step\"", "mode = \"fly\"");
+    let flown = sweep::plan(&job(&fly), &mechanics).unwrap();
+    let price = Light::new(&flown, &mechanics);
+    assert_eq!(price.readings, 2 * lit);
+    assert!(
+        price.worst_s > flown.seconds() + 2.0 * lit as f64 * 9.0 * 0.106,
+        "{price:?}"
     );
 }
