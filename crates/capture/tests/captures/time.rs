@@ -1,10 +1,11 @@
 //! How long a capture takes beside what the mechanics and the light demand.
 
 use capture::{Outcome, Reading};
+use rig::RigFile;
 use rig::dynamixel::register::servo;
 use sweep::Sweep;
 
-use crate::bench::{QUICKSTART, SERVOS, Scene, peek};
+use crate::bench::{QUICKSTART, SERVOS, SHORT, Scene, assert_complete, peek};
 
 /// Units of the profile registers in degrees/s and degrees/s²: 0.229 rev/min and 214.577 rev/min² (e-manual, "Profile
 /// Velocity(112)", "Profile Acceleration(108)").
@@ -75,5 +76,37 @@ async fn a_full_capture_takes_hardly_longer_than_its_motion_settling_and_light()
             taken_s < 1.15 * floor_s,
             "{specimen}: floor {floor_s} s, taken {taken_s} s"
         );
+    }
+}
+
+/// The least and the most that a servo's profile registers hold within its velocity limit, in all four pairs: what is
+/// measured does not depend on how the arms came there, and the plan knows how long they take.
+#[tokio::test(start_paused = true)]
+async fn very_slow_and_very_fast_arms_measure_the_same_in_the_time_that_was_planned() {
+    let mut first: Option<Vec<[u32; 3]>> = None;
+    for velocity in [1.4, 270.0] {
+        for acceleration in [21.5, 100_000.0] {
+            let arm = format!("velocity_deg_s = {velocity}\nacceleration_deg_s2 = {acceleration}\n");
+            let text = format!("[light]\n{arm}[sensor]\n{arm}[sim]\nimperfections = \"none\"");
+            let file = RigFile::parse(&text, "test.toml".as_ref()).expect("a good rig file");
+            let mut scene = Scene::on(file, SHORT).await;
+            let before = scene.bench.now();
+            assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+            assert_complete(&scene.journal);
+            scene.assert_safe();
+            let taken_s = (scene.bench.now() - before).as_secs_f64();
+            let planned_s = scene.journal.plan().seconds();
+            println!("{velocity}°/s, {acceleration}°/s²: planned {planned_s:.2} s, taken {taken_s:.2} s");
+            assert!(
+                (taken_s / planned_s - 1.0).abs() < 0.1,
+                "{velocity}°/s, {acceleration}°/s²"
+            );
+            let rgb: Vec<[u32; 3]> = scene.journal.accepted().iter().map(|r| r.counts.rgb).collect();
+            assert_eq!(
+                *first.get_or_insert(rgb.clone()),
+                rgb,
+                "{velocity}°/s, {acceleration}°/s²"
+            );
+        }
     }
 }

@@ -4,3 +4,4 @@ mod absolute;
 mod bench;
 mod coverage;
 mod flight;
+mod range;
