@@ -1,0 +1,95 @@
+//! Rows of the tables and what they stand for.
+
+use capture::Record;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use sqlx::Row;
+use sqlx::sqlite::SqliteRow;
+
+use crate::store::StoreError;
+use crate::{Job, RunView};
+
+pub(super) fn failed(what: &'static str) -> impl Fn(sqlx::Error) -> StoreError {
+    move |source| StoreError::Query { what, source }
+}
+
+pub(super) fn job(row: &SqliteRow) -> Result<Job, StoreError> {
+    let id: String = column(row, "id")?;
+    Ok(Job {
+        id: id
+            .parse()
+            .map_err(|why| StoreError::Damaged { what: "job", why })?,
+        place: number(row, "place")?,
+        name: column(row, "name")?,
+        specimen: column(row, "specimen")?,
+        on_stage: column::<i64>(row, "on_stage")? != 0,
+        text: column(row, "body")?,
+        state: of_word(&column::<String>(row, "state")?, "job")?,
+        why: column(row, "why")?,
+        run: column(row, "run")?,
+        by: column(row, "submitted_by")?,
+        submitted: column(row, "submitted")?,
+        changed: column(row, "changed")?,
+    })
+}
+
+pub(super) fn run(row: &SqliteRow) -> Result<RunView, StoreError> {
+    let job: String = column(row, "job")?;
+    Ok(RunView {
+        id: column(row, "id")?,
+        job: job
+            .parse()
+            .map_err(|why| StoreError::Damaged { what: "run", why })?,
+        name: column(row, "name")?,
+        specimen: column(row, "specimen")?,
+        directory: column::<String>(row, "directory")?.into(),
+        started: column(row, "started")?,
+        reported: column(row, "reported")?,
+        planned: number(row, "planned")?,
+        accepted: number(row, "accepted")?,
+    })
+}
+
+pub(super) fn column<'r, T>(row: &'r SqliteRow, name: &'static str) -> Result<T, StoreError>
+where
+    T: sqlx::Decode<'r, sqlx::Sqlite> + sqlx::Type<sqlx::Sqlite>,
+{
+    row.try_get(name).map_err(failed("read a column"))
+}
+
+pub(super) fn number(row: &SqliteRow, name: &'static str) -> Result<u64, StoreError> {
+    let number: i64 = column(row, name)?;
+    u64::try_from(number).map_err(|_| StoreError::Damaged {
+        what: "number",
+        why: format!("{name} is {number}"),
+    })
+}
+
+/// How an enum is spelled in a column: as in JSON, without the quotes.
+pub(super) fn word(value: &impl Serialize) -> String {
+    json(value).trim_matches('"').to_owned()
+}
+
+pub(super) fn of_word<T: DeserializeOwned>(word: &str, what: &'static str) -> Result<T, StoreError> {
+    serde_json::from_value(word.into()).map_err(|error| StoreError::Damaged {
+        what,
+        why: error.to_string(),
+    })
+}
+
+pub(super) fn json(value: &impl Serialize) -> String {
+    serde_json::to_string(value).expect("our own types have string keys only")
+}
+
+pub(super) fn kind(record: &Record) -> &'static str {
+    match record {
+        Record::Header(_) => "header",
+        Record::Begin { .. } => "begin",
+        Record::Reading(_) => "reading",
+        Record::Extension(_) => "extension",
+        Record::Repeat { .. } => "repeat",
+        Record::Suspended { .. } => "suspended",
+        Record::Released { .. } => "released",
+        Record::End { .. } => "end",
+    }
+}

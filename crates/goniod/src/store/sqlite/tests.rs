@@ -1,0 +1,150 @@
+use capture::Outcome;
+use tempfile::TempDir;
+
+use super::*;
+use crate::{FaultCode, JobState};
+
+fn end(text: &str) -> Record {
+    Record::End {
+        outcome: Outcome::Failed {
+            fault: text.to_owned(),
+        },
+        device_ticks: Some(7),
+        at: String::new(),
+    }
+}
+
+async fn with_run(store: &Sqlite) -> RunView {
+    let mut job = Job {
+        id: JobId::generate(),
+        place: 0,
+        name: "job.toml".to_owned(),
+        specimen: "gold".to_owned(),
+        on_stage: true,
+        text: "[[plane]]".to_owned(),
+        state: JobState::AwaitingSpecimen,
+        why: Some("so".to_owned()),
+        run: None,
+        by: "me".to_owned(),
+        submitted: "then".to_owned(),
+        changed: "now".to_owned(),
+    };
+    store.add_job(&mut job).await.unwrap();
+    let run = RunView {
+        id: "01".to_owned(),
+        job: job.id,
+        name: job.name.clone(),
+        specimen: job.specimen.clone(),
+        directory: "/runs/01".into(),
+        started: "then".to_owned(),
+        reported: None,
+        planned: 3,
+        accepted: 0,
+    };
+    store.begin_run(&run, &end("the header")).await.unwrap();
+    job.run = Some(run.id.clone());
+    assert_eq!(store.job(job.id).await.unwrap(), Some(job.clone()));
+    assert_eq!(store.jobs(0).await.unwrap(), [job]);
+    run
+}
+
+#[tokio::test]
+async fn what_was_kept_is_there_after_it_is_opened_again() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("goniod.db");
+    let store = Sqlite::open(&path).await.unwrap();
+    assert_eq!(store.begin_life("then").await.unwrap(), 1);
+    let run = with_run(&store).await;
+    store.append(&run.id, 1, &end("first")).await.unwrap();
+    let fault = FaultView {
+        code: FaultCode::NoReply,
+        text: "silent".to_owned(),
+        at: "then".to_owned(),
+        run: Some(run.id.clone()),
+    };
+    store.latch(&fault).await.unwrap();
+    store.audit("then", "me", "estop", "done").await.unwrap();
+    store.close().await;
+    let store = Sqlite::open(&path).await.unwrap();
+    assert_eq!(store.begin_life("now").await.unwrap(), 2);
+    assert_eq!(
+        store.records(&run.id).await.unwrap(),
+        [end("the header"), end("first")]
+    );
+    assert_eq!(store.runs(9).await.unwrap(), std::slice::from_ref(&run));
+    assert_eq!(store.latched().await.unwrap(), Some(fault));
+    store.acknowledge("me", "now").await.unwrap();
+    assert_eq!(store.latched().await.unwrap(), None);
+    store.reported(&run.id, "now").await.unwrap();
+    let reported = store.run(&run.id).await.unwrap().unwrap().reported;
+    assert_eq!(reported.as_deref(), Some("now"));
+    store.close().await;
+}
+
+#[tokio::test]
+async fn a_place_in_a_journal_is_taken_once() {
+    let folder = TempDir::new().unwrap();
+    let store = Sqlite::open(&folder.path().join("goniod.db")).await.unwrap();
+    let run = with_run(&store).await;
+    store.append(&run.id, 1, &end("first")).await.unwrap();
+    store.append(&run.id, 1, &end("second")).await.unwrap_err();
+    assert_eq!(store.records(&run.id).await.unwrap().len(), 2);
+    store.close().await;
+}
+
+/// SQLite's own limit on the size of its file stands for a full disk: it is the same error.
+#[tokio::test]
+async fn a_full_disk_is_told_as_such_and_keeps_what_was_there() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("goniod.db");
+    let store = Sqlite::open(&path).await.unwrap();
+    let run = with_run(&store).await;
+    store.close().await;
+    let small = SqliteConnectOptions::new().pragma("max_page_count", "40");
+    let store = Sqlite::with(&path, small).await.unwrap();
+    let long = "x".repeat(8_000);
+    let mut kept = 1;
+    let error = loop {
+        match store.append(&run.id, kept, &end(&long)).await {
+            Ok(()) => kept += 1,
+            Err(error) => break error,
+        }
+    };
+    assert_eq!(error.code(), FaultCode::DiskFull, "{error:?}");
+    assert_eq!(store.records(&run.id).await.unwrap().len() as u64, kept);
+    store.close().await;
+    let store = Sqlite::open(&path).await.unwrap();
+    store.append(&run.id, kept, &end(&long)).await.unwrap();
+    store.close().await;
+}
+
+/// The pragma stands for a file that may not be written, which root may always: it is the same error.
+#[tokio::test]
+async fn a_store_that_may_not_be_written_is_told_as_such_and_can_be_read() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("goniod.db");
+    let store = Sqlite::open(&path).await.unwrap();
+    let run = with_run(&store).await;
+    sqlx::query("PRAGMA query_only = 1")
+        .execute(&store.writer)
+        .await
+        .unwrap();
+    let error = store.append(&run.id, 1, &end("first")).await.unwrap_err();
+    assert_eq!(error.code(), FaultCode::ReadOnly, "{error:?}");
+    assert_eq!(store.records(&run.id).await.unwrap(), [end("the header")]);
+    store.close().await;
+}
+
+#[tokio::test]
+async fn what_is_no_database_is_not_opened() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("goniod.db");
+    std::fs::write(&path, "a".repeat(5000)).unwrap();
+    let error = Sqlite::open(&path).await.unwrap_err();
+    assert_eq!(error.code(), FaultCode::Store, "{error:?}");
+    let nowhere = folder.path().join("missing").join("goniod.db");
+    assert!(matches!(
+        Sqlite::open(&nowhere).await,
+        Err(StoreError::Open { .. })
+    ));
+}
