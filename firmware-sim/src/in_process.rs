@@ -123,7 +123,7 @@ impl Rig for InProcessRig {
     async fn wait(&mut self, duration: Duration) -> Result<(), InProcessError> {
         let until = self.bench.lock().now() + duration;
         tokio::time::sleep_until(self.bench.switched_on + until).await;
-        self.bench.lock().advance_to(until);
+        self.bench.advance_to(until);
         Ok(())
     }
 }
@@ -174,9 +174,18 @@ impl SharedBench {
         self.lock().device(device).write(register.address, bytes)
     }
 
+    /// Lets a wait end when it was to end, and not when its timer fired.
+    fn advance_to(&self, until: Duration) {
+        self.alone().advance_to(until);
+    }
+
+    fn alone(&self) -> MutexGuard<'_, Bench> {
+        self.bench.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// The bench at the present moment.
     fn lock(&self) -> MutexGuard<'_, Bench> {
-        let mut bench = self.bench.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut bench = self.alone();
         let elapsed = self.switched_on.elapsed();
         if elapsed > bench.now() + TIMER_GRAIN {
             bench.advance_to(elapsed);

@@ -78,6 +78,11 @@ async fn time_passes_as_asked_not_as_timers_round() {
     }
     assert_eq!(rig.bench().now(), Duration::from_millis(130));
     assert_eq!(rig.photometer().ticks().await.unwrap(), 13_000);
+    // Longer than by what a timer's clock may run ahead.
+    for _ in 0..100 {
+        rig.wait(Duration::from_micros(2_730)).await.unwrap();
+    }
+    assert_eq!(rig.bench().now(), Duration::from_millis(403));
 }
 
 #[tokio::test(start_paused = true)]
