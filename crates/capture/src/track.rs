@@ -77,11 +77,17 @@ impl Track {
 
     /// When the arm will be at an angle on its way, or at rest where that is beyond its goal.
     pub(crate) fn when(&self, angle: f64) -> f64 {
-        let (start_s, trajectory) = self.legs[self.legs.len() - 1];
-        if !start_s.is_finite() {
+        let begins = |leg: &(f64, Trajectory)| leg.1.at(0.0).0;
+        // What the arm, being late, has still to pass may lie before the last turn of its profile.
+        let leads = |leg: &&(f64, Trajectory)| {
+            leg.0.is_finite() && (angle - begins(leg)) * (leg.1.goal() - begins(leg)) >= 0.0
+        };
+        let first = self.legs.iter().find(|leg| leg.0.is_finite());
+        let Some(&leg) = self.legs.iter().rev().find(leads).or(first) else {
             return f64::INFINITY;
-        }
-        let from = trajectory.at(0.0).0;
+        };
+        let (start_s, trajectory) = leg;
+        let from = begins(&leg);
         let way = |t_s: f64| (trajectory.at(t_s).0 - from).abs();
         let wanted = (angle - from) * (trajectory.goal() - from).signum();
         let (mut before, mut after) = (0.0, trajectory.duration_s());
@@ -193,5 +199,32 @@ mod tests {
             );
         }
         assert!((track.when(-2.0) - 2.0 - PROFILE.duration_s(1.0)).abs() < 1e-6);
+    }
+
+    /// The arm is still before the angle at which it was told another speed.
+    #[test]
+    fn what_a_late_arm_has_still_to_pass_is_foreseen_across_a_turn_of_its_profile() {
+        let late_s = 0.02;
+        let mut track = Track::resting(0.0, PROFILE);
+        track.steer(0.0, 2.0, PROFILE);
+        for i in 0..160 {
+            let t_s = f64::from(i) * 0.005;
+            track.saw(t_s, track.told(t_s - late_s).0);
+        }
+        let slower = Profile {
+            velocity_rad_s: 0.5,
+            ..PROFILE
+        };
+        track.steer(0.8, 2.0, slower);
+        let (actual, told) = (track.expected(0.8), track.told(0.8).0);
+        for share in [0.25, 0.5, 0.75, 1.5] {
+            let angle = actual + share * (told - actual);
+            let at_s = track.when(angle);
+            assert!(at_s > 0.8, "{angle} rad at {at_s} s, which is over");
+            assert!(
+                (track.expected(at_s) - angle).abs() < 1e-6,
+                "{angle} rad at {at_s} s"
+            );
+        }
     }
 }
