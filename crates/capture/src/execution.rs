@@ -11,6 +11,7 @@ use crate::progress::Progress;
 use crate::run::Ask;
 use crate::{CaptureError, Command, Event, Flag, Journal, Reading, Record, State, closed, mechanics};
 
+mod dark;
 mod fly;
 mod shutdown;
 mod suspend;
@@ -163,6 +164,7 @@ impl<'a, R: Rig> Execution<'a, R> {
             // Its own path leads from its neighbour in the pass.
             self.standing = self.standing.filter(|&pose| pose == step.pose());
             self.obey().await?;
+            self.suspend().await?;
             self.step(&step).await?;
         }
         Ok(())
@@ -272,10 +274,7 @@ impl<'a, R: Rig> Execution<'a, R> {
         }
         let mut retries = self.drive.retries();
         let measured = self.travel(step).await?;
-        let fixed = step.exposure.map(|(gain, integration_us)| Exposure {
-            integration_us,
-            gain: Gain::ALL[usize::from(gain).min(Gain::ALL.len() - 1)],
-        });
+        let fixed = fixed(step);
         let mut exposure = fixed.unwrap_or_else(|| self.ranging.first(step.sweep, step.pose()));
         let mut beside = None;
         for left in (0..MAX_EXPOSURES).rev() {
@@ -304,11 +303,8 @@ impl<'a, R: Rig> Execution<'a, R> {
     /// Exposes, and looks at the lamp.
     async fn expose(&mut self, step: &Step, exposure: Exposure) -> Result<Counts, Interrupt<R::Error>> {
         let counts = self.drive.expose(exposure).await?;
-        if step.lamp && self.lamp_is_out(&counts) {
-            return Err(Interrupt::Lamp);
-        }
-        if step.lamp && self.file.visits.lamp == Lamp::Monitor {
-            self.note_lamp(&counts);
+        if step.lamp {
+            self.heed_lamp(&counts)?;
         }
         Ok(counts)
     }
@@ -496,6 +492,14 @@ impl<'a, R: Rig> Execution<'a, R> {
             retries: self.drive.retries(),
         });
     }
+}
+
+/// The exposure that a step must have, where it is not ranged.
+fn fixed(step: &Step) -> Option<Exposure> {
+    step.exposure.map(|(gain, integration_us)| Exposure {
+        integration_us,
+        gain: Gain::ALL[usize::from(gain).min(Gain::ALL.len() - 1)],
+    })
 }
 
 fn readings(records: &[Record]) -> impl Iterator<Item = &Reading> {

@@ -43,7 +43,8 @@ pub struct Step {
     /// Gain step (0, 1, 2) and integration time in µs that the reading must have; `None`: ranged from the readings
     /// before. Dark readings are fixed.
     pub exposure: Option<(u8, u32)>,
-    /// The flight to which it belongs: readings that the arms pass without a stop; `None`: they rest for it.
+    /// The flight to which it belongs: readings that the arms pass without a stop, or dark ones on their way to the pose;
+    /// `None`: they rest for it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pass: Option<usize>,
     /// Estimated seconds of motion, settling and integration.

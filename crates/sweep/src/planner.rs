@@ -22,7 +22,7 @@ const DARK_REPEATS: usize = 4;
 /// value in it is made of are left out.
 ///
 /// In flight each sweep is passed there and back, every pose a step of both, so that what play and lateness add in one
-/// direction the other takes away. A sweep whose arms would not move alike is stepped, and the plan says so.
+/// direction the other takes away. The first dark readings are taken on the way to it. A sweep whose arms would not move alike is stepped, and the plan says so.
 ///
 /// # Errors
 /// The arms stand outside the envelope; a sweep of which nothing can be measured on this rig, with its key and why; a
@@ -93,7 +93,13 @@ fn lay(
     };
 
     let mut draft = Draft::new(mechanics, start);
-    draft.dark();
+    match order.first() {
+        // The arms need not wait for what has no light.
+        Some(&(i, backwards)) if flown[i] && mechanics.reference.is_none() => {
+            draft.dark_on_the_way(poses[i][if backwards { poses[i].len() - 1 } else { 0 }]);
+        }
+        _ => draft.dark(),
+    }
     draft.visit_reference(&job.name)?;
     for (i, backwards) in order {
         let mut along = poses[i].clone();
@@ -295,23 +301,48 @@ impl<'a> Draft<'a> {
     fn dark(&mut self) {
         self.cold = self.dark_sets > 0;
         self.dark_sets += 1;
-        for gain in 0..GAINS {
-            for integration_us in self.mechanics.integration_us {
-                for _ in 0..DARK_REPEATS {
-                    let seconds = self.mechanics.settle_s
-                        + f64::from(integration_us) * 1e-6
-                        + self.mechanics.transaction_s;
-                    self.push(
-                        Sweep::Dark,
-                        vec![self.standing.pose],
-                        Some((gain, integration_us)),
-                        None,
-                        seconds,
-                    );
-                }
-            }
+        for exposure in darks(self.mechanics) {
+            let seconds = self.mechanics.settle_s + self.dark_s(exposure);
+            self.push(
+                Sweep::Dark,
+                vec![self.standing.pose],
+                Some(exposure),
+                None,
+                seconds,
+            );
         }
         self.since_dark_s = 0.0;
+    }
+
+    /// All dark readings, while the arms go to a pose; where they stand, if no safe way leads there.
+    fn dark_on_the_way(&mut self, to: Pose) {
+        let Some(route) = route(self.mechanics, self.standing, to) else {
+            return self.dark();
+        };
+        self.dark_sets += 1;
+        let mut path = route.path;
+        let mut motion_s = route.seconds;
+        for exposure in darks(self.mechanics) {
+            let seconds = self.dark_s(exposure);
+            motion_s -= seconds;
+            let path = std::mem::replace(&mut path, vec![to]);
+            self.push(Sweep::Dark, path, Some(exposure), Some(self.passes), seconds);
+        }
+        // What is left of the way comes after the last of them.
+        if let Some(last) = self.steps.last_mut() {
+            last.seconds += motion_s.max(0.0);
+        }
+        self.passes += 1;
+        self.standing = Standing {
+            pose: to,
+            approached: true,
+        };
+        self.since_dark_s = 0.0;
+    }
+
+    /// Seconds of one dark reading, arms aside.
+    fn dark_s(&self, (_, integration_us): (u8, u32)) -> f64 {
+        f64::from(integration_us) * 1e-6 + self.mechanics.transaction_s
     }
 
     /// A sweep along poses; what no safe way leads to is left out.
@@ -398,6 +429,14 @@ impl<'a> Draft<'a> {
             seconds,
         });
     }
+}
+
+/// Gain step and integration time of each dark reading of a set.
+fn darks(mechanics: &Mechanics) -> impl Iterator<Item = (u8, u32)> + use<> {
+    let integration_us = mechanics.integration_us;
+    (0..GAINS)
+        .flat_map(move |gain| integration_us.map(|us| (gain, us)))
+        .flat_map(|exposure| [exposure; DARK_REPEATS])
 }
 
 /// Looks at every leg once more.

@@ -26,20 +26,32 @@ const STUCK: Duration = Duration::from_millis(100);
 const IDLE_S: f64 = 0.002;
 
 impl<R: Rig> Execution<'_, R> {
-    /// Flies the pass to which a step belongs, again where the operator holds it. Its readings count once it has landed;
+    /// Flies the pass to which a step belongs, again where it was held. Its readings count once it has landed;
     /// those that are saturated, blurred or missing are left to be taken at rest.
     pub(super) async fn pass(&mut self, pass: usize) -> Result<(), Interrupt<R::Error>> {
         loop {
             self.obey().await?;
+            self.suspend().await?;
             let undone = |step: &&Step| step.pass == Some(pass) && !self.done[step.index];
             let steps: Vec<Step> = self.plan.steps.iter().filter(undone).cloned().collect();
-            if steps.is_empty() || self.fly(&steps).await? {
+            let landed = match steps.first().map(|step| step.lamp) {
+                None => true,
+                Some(true) => self.fly(&steps).await?,
+                Some(false) => self.dark_on_the_way(&steps).await?,
+            };
+            if landed {
                 return Ok(());
             }
         }
     }
 
-    /// One flight; returns whether it landed. Held on the operator's wish, it brakes, and is to be flown again.
+    /// Whether the operator wants the arms held.
+    pub(super) fn held(&self) -> bool {
+        matches!(*self.control.borrow(), Command::Pause | Command::Finish)
+    }
+
+    /// One flight; returns whether it landed. Where the operator wants it held, or `[suspend]` does, it brakes, and is to
+    /// be flown again.
     async fn fly(&mut self, steps: &[Step]) -> Result<bool, Interrupt<R::Error>> {
         let mut flight = Flight::new(steps, self.file, IDLE_S);
         if flight.moving.is_empty() {
@@ -54,6 +66,8 @@ impl<R: Rig> Execution<'_, R> {
                 Some(self.look().await?)
             }
         };
+        // They may still be on the way there.
+        self.drive.rest().await?;
         self.travel(&steps[0]).await?;
         if let Some(since) = lit {
             let passed = self.look().await?.saturating_sub(since);
@@ -86,7 +100,10 @@ impl<R: Rig> Execution<'_, R> {
         flight.steered(now_s);
         let mut retries = self.drive.retries();
         while flight.next < flight.steps.len() {
-            if matches!(*self.control.borrow(), Command::Pause | Command::Finish) {
+            if self.held() {
+                return Ok(false);
+            }
+            if self.unfit_now().await? {
                 return Ok(false);
             }
             let (seen, now_s) = self.sight(flight).await?;
@@ -107,6 +124,7 @@ impl<R: Rig> Execution<'_, R> {
             let (counts, after_s) = self
                 .collect(flight, seen.snapshot.detector.sequence, exposure)
                 .await?;
+            self.heed_lamp(&counts)?;
             let idle = after_s - now_s - ahead.as_secs_f64() - 2.0 * half_s;
             flight.idled(idle);
             let mut reading = self.aloft(step, counts, seen.snapshot.pose());
@@ -195,13 +213,13 @@ impl<R: Rig> Execution<'_, R> {
     }
 
     /// A reading as it is known in flight; it does not count yet.
-    fn aloft(&mut self, step: &Step, counts: Counts, measured: Pose) -> Reading {
+    pub(super) fn aloft(&mut self, step: &Step, counts: Counts, measured: Pose) -> Reading {
         Reading {
             step: step.index,
             attempt: self.attempts[step.index],
             accepted: false,
             sweep: step.sweep,
-            lamp: true,
+            lamp: step.lamp,
             goal: step.pose(),
             measured,
             counts,

@@ -1,4 +1,4 @@
-use rig::{Band, Rig, Suspend};
+use rig::{Band, Lamp, Rig, Suspend};
 
 use super::{Execution, Interrupt, TICKS_PER_S, now};
 use crate::{Event, Record, State};
@@ -7,9 +7,7 @@ impl<R: Rig> Execution<'_, R> {
     /// Holds while something is not as `[suspend]` wants it; looks no oftener than that says.
     pub(super) async fn suspend(&mut self) -> Result<(), Interrupt<R::Error>> {
         let every = self.file.suspend.every;
-        // By the photometer's clock: a simulated one runs ahead of ours.
-        let ticks = (every.as_secs_f64() * TICKS_PER_S) as u64;
-        if self.judged.is_some_and(|judged| self.mark < judged + ticks) {
+        if !self.judgement_is_due() {
             return Ok(());
         }
         let Some(mut why) = self.unfit(false).await? else {
@@ -46,6 +44,25 @@ impl<R: Rig> Execution<'_, R> {
         Ok(())
     }
 
+    /// Whether arms in flight are to be held, where it is time for a look. [`Self::suspend`] then looks again, and says why.
+    pub(super) async fn unfit_now(&mut self) -> Result<bool, Interrupt<R::Error>> {
+        if !self.judgement_is_due() {
+            return Ok(false);
+        }
+        let unfit = self.unfit(false).await?.is_some();
+        if unfit {
+            self.judged = None;
+        }
+        Ok(unfit)
+    }
+
+    /// By the photometer's clock: a simulated one runs ahead of ours.
+    fn judgement_is_due(&self) -> bool {
+        let ticks = (self.file.suspend.every.as_secs_f64() * TICKS_PER_S) as u64;
+        self.judged
+            .is_none_or(|judged| self.clock.last() >= judged + ticks)
+    }
+
     async fn tell_suspended(&mut self, why: String) -> Result<(), Interrupt<R::Error>> {
         self.append(&Record::Suspended {
             why: why.clone(),
@@ -60,7 +77,7 @@ impl<R: Rig> Execution<'_, R> {
 
     /// What keeps the run from going on, in words.
     async fn unfit(&mut self, holding: bool) -> Result<Option<String>, Interrupt<R::Error>> {
-        self.judged = Some(self.mark);
+        self.judged = Some(self.clock.last());
         let Suspend {
             temperature_c,
             supply_v,
@@ -109,8 +126,19 @@ impl<R: Rig> Execution<'_, R> {
         Ok(())
     }
 
+    /// Looks at what a lit reading says of the lamp, where it has a monitor.
+    pub(super) fn heed_lamp(&mut self, counts: &rig::Counts) -> Result<(), Interrupt<R::Error>> {
+        if self.lamp_is_out(counts) {
+            return Err(Interrupt::Lamp);
+        }
+        if self.file.visits.lamp == Lamp::Monitor {
+            self.note_lamp(counts);
+        }
+        Ok(())
+    }
+
     /// Remembers how bright the lamp was.
-    pub(super) fn note_lamp(&mut self, counts: &rig::Counts) {
+    fn note_lamp(&mut self, counts: &rig::Counts) {
         let nominal = self.file.calibration.monitor * f64::from(counts.exposure.integration_us);
         let level = f64::from(counts.monitor) / nominal;
         if holds(self.file.suspend.lamp_rel, (level - 1.0).abs(), false) {
