@@ -73,9 +73,9 @@ fn seconds(records: &[Record]) -> f64 {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_flight_is_as_true_as_stopping_in_half_the_time() {
+async fn a_flight_is_as_true_as_stopping_in_a_third_of_the_time() {
     let fly = QUICKSTART.replace("mode = \"step\"", "mode = \"fly\"");
-    for name in ["gold-paint"] {
+    for name in ["gold-paint", "chrome", "alum-bronze", "nickel"] {
         let specimen = brdf::specimen(name).unwrap();
         let [stepped, flown] = [score(&specimen, QUICKSTART).await, score(&specimen, &fly).await];
         for (mode, s) in [("stepped", &stepped), ("flown", &flown)] {
@@ -88,7 +88,7 @@ async fn a_flight_is_as_true_as_stopping_in_half_the_time() {
             );
         }
         assert!(
-            flown.seconds * 2.0 < stepped.seconds && flown.seconds < 40.0,
+            flown.seconds * 3.0 < stepped.seconds && flown.seconds < 40.0,
             "{name}"
         );
         assert!(
