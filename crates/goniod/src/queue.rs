@@ -513,14 +513,15 @@ impl Queue {
         if state.over() {
             self.jobs.retain(|job| job.id != id);
         }
-        self.shared.tell(What::Job {
-            job: Box::new(changed.clone()),
-        });
+        // Who hears of it and asks the store must find it there.
         if let Err(error) = self.shared.store.change_job(&changed).await {
             self.shared.warn(format!(
                 "the state of job {id} is not in the store: {}",
                 chain(&error)
             ));
         }
+        self.shared.tell(What::Job {
+            job: Box::new(changed),
+        });
     }
 }
