@@ -112,6 +112,8 @@ function showNow() {
     const { done, of, seconds_left: left, retries } = rig.progress;
     $("bar").max = of;
     $("bar").value = done;
+    const taken = document.querySelector(`[data-run="${rig.run}"]`);
+    if (taken) taken.textContent = `${done} of ${of}`;
     measurePace(left);
     $("left").textContent = `${done} of ${of} readings, ${clock(left * (pace?.factor ?? 1))} left` + (retries ? `, ${retries} ${retries === 1 ? "retry" : "retries"}` : "");
   } else {
@@ -167,8 +169,10 @@ function showRuns() {
     const state = jobs.get(run.job)?.state ?? "–";
     const report = run.reported ? node("a", { href: `#run/${run.id}` }, "open",
       node("span", { className: "unseen" }, ` the report of ${title(run)}`)) : "not yet";
+    const taken = node("td", {}, `${run.accepted} of ${run.planned}`);
+    taken.dataset.run = run.id;
     return node("tr", {}, node("td", {}, title(run)), node("td", {}, chip(state)), node("td", {}, when(run.started)),
-      node("td", {}, `${run.accepted} of ${run.planned}`), node("td", {}, report));
+      taken, node("td", {}, report));
   }));
 }
 
