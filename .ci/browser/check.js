@@ -52,7 +52,14 @@ async function look(name) {
       const page = await open({ viewport, colorScheme, isMobile: size === "narrow" }, new URL(main.url()).hash);
       await until("the arms", async () => (await angle(page, "light")) !== "–");
       for (const plot of ["g", "f"]) await until(`the readings in ${plot}`, async () => (await dots(page, plot)) >= known[plot]);
-      if (page.url().includes("#run/")) await checks(page).waitFor();
+      await until("plots to scale", () => page.evaluate(() => [...document.querySelectorAll(".plot")].every((plot) =>
+        !plot.clientWidth || plot.querySelector("svg").viewBox.baseVal.width === Math.max(plot.clientWidth, 240))));
+      if (page.url().includes("#run/")) {
+        await checks(page).waitFor();
+        await page.frameLocator("#report-frame").locator("img").first().evaluate((img) => img.decode());
+      }
+      // Drawn once with all of that.
+      await page.evaluate(() => new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn))));
       await page.screenshot({ path: join(shots, `${name}-${size}-${colorScheme}.png`), fullPage: true, animations: "disabled" });
       const wide = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
       if (wide > 0) complaints.push(`${name} ${size}: ${wide} pixels too wide`);

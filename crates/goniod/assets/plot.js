@@ -59,7 +59,14 @@ export class Plot {
     this.output = document.createElement("output");
     this.width = 640;
     this.svg = element("svg", { "aria-hidden": "true" });
-    new ResizeObserver(() => { this.width = Math.max(host.clientWidth, 240); this.later(); }).observe(host);
+    // Of one height whatever the width, and drawn at once: nobody shall see it out of scale.
+    this.svg.style.height = `${HEIGHT}px`;
+    new ResizeObserver(() => {
+      // One that is hidden has no width.
+      if (!host.clientWidth) return;
+      this.width = Math.max(host.clientWidth, 240);
+      this.draw();
+    }).observe(host);
     host.append(this.svg, this.output);
     host.addEventListener("pointermove", (event) => this.mark(this.nearest(event)));
     host.addEventListener("pointerleave", () => this.mark(-1));
