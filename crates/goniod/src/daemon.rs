@@ -181,6 +181,16 @@ impl Daemon {
         self.command(by, Verb::Proceed, Command::Run, |now| now == Command::Pause)
     }
 
+    /// Finishes the reading, holds the arms, lamp off, and ends the run; it can be resumed.
+    ///
+    /// # Errors
+    /// Nothing is under way.
+    pub async fn finish(&self, by: &Caller) -> Result<(), Refusal> {
+        self.command(by, Verb::Finish, Command::Finish, |now| {
+            matches!(now, Command::Run | Command::Pause)
+        })
+    }
+
     /// Decelerates now on the profiles, holds, and ends the run; it can be resumed.
     ///
     /// # Errors
@@ -231,6 +241,11 @@ impl Daemon {
     /// Live picture of the rig.
     pub fn rig(&self) -> watch::Receiver<RigView> {
         self.shared.view.subscribe()
+    }
+
+    /// Text of the rig file.
+    pub fn rig_file(&self) -> &str {
+        &self.shared.settings.rig
     }
 
     /// Events as they happen: those after an id, as far as they are kept, or from now on.

@@ -46,6 +46,7 @@ pub(crate) enum Ask {
 pub(crate) enum Verb {
     Pause,
     Proceed,
+    Finish,
     Stop,
     Estop,
 }
@@ -55,6 +56,7 @@ impl std::fmt::Display for Verb {
         f.write_str(match self {
             Self::Pause => "pause",
             Self::Proceed => "go on",
+            Self::Finish => "finish",
             Self::Stop => "stop",
             Self::Estop => "emergency stop",
         })
@@ -425,7 +427,7 @@ impl Queue {
                     self.latch(FaultCode::Estop, format!("emergency stop by {by}"))
                         .await;
                 }
-                if matches!(verb, Verb::Stop | Verb::Estop)
+                if matches!(verb, Verb::Finish | Verb::Stop | Verb::Estop)
                     && let Some(id) = self.current
                 {
                     self.change(id, Cause::Halt, None).await;

@@ -102,7 +102,8 @@ async fn run(arguments: Arguments) -> anyhow::Result<()> {
     let daemon = Daemon::open(Settings {
         rig,
         rig_name,
-        data: arguments.data.clone(),
+        // Clients are told of run directories, and work elsewhere.
+        data: std::path::absolute(&arguments.data).context("--data")?,
         clock: SystemTime::now,
     })
     .await?;

@@ -19,8 +19,9 @@ use crate::Caller;
 pub(crate) const COOKIE: &str = "goniod";
 
 /// Paths that stop the rig, or let it be used again: no request rate holds them up.
-const NEVER_HELD_UP: [&str; 4] = [
+const NEVER_HELD_UP: [&str; 5] = [
     "/api/v1/estop",
+    "/api/v1/finish",
     "/api/v1/stop",
     "/api/v1/pause",
     "/api/v1/acknowledge",

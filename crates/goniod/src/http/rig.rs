@@ -1,7 +1,7 @@
 use arms::{Arm, ArmAngle};
 use axum::body::Bytes;
 use axum::extract::State;
-use axum::http::{HeaderMap, StatusCode};
+use axum::http::{HeaderMap, HeaderName, StatusCode, header};
 use axum::{Extension, Json};
 use serde::Deserialize;
 use utoipa::ToSchema;
@@ -38,8 +38,10 @@ enum ArmName {
 pub(crate) fn routes() -> OpenApiRouter<Shared> {
     OpenApiRouter::new()
         .routes(routes!(rig))
+        .routes(routes!(rig_file))
         .routes(routes!(pause))
         .routes(routes!(proceed))
+        .routes(routes!(finish))
         .routes(routes!(stop))
         .routes(routes!(estop))
         .routes(routes!(acknowledge))
@@ -51,6 +53,14 @@ pub(crate) fn routes() -> OpenApiRouter<Shared> {
 #[utoipa::path(get, path = "/rig", tag = "rig", responses((status = 200, body = RigView)))]
 async fn rig(State(shared): State<Shared>) -> Json<RigView> {
     Json(shared.daemon.rig().borrow().clone())
+}
+
+/// The rig file, as the daemon was given it.
+#[utoipa::path(get, path = "/rig/file", tag = "rig",
+    responses((status = 200, body = String, content_type = "application/toml")))]
+async fn rig_file(State(shared): State<Shared>) -> ([(HeaderName, &'static str); 1], String) {
+    let toml = [(header::CONTENT_TYPE, "application/toml")];
+    (toml, shared.daemon.rig_file().to_owned())
 }
 
 /// Finish the reading, then hold.
@@ -66,6 +76,14 @@ async fn pause(State(shared): State<Shared>, Extension(by): Extension<Caller>) -
     (status = 409, body = Problem, content_type = "application/problem+json", description = "Nothing is paused")))]
 async fn proceed(State(shared): State<Shared>, Extension(by): Extension<Caller>) -> Done {
     shared.daemon.proceed(&by).await?;
+    Ok(DONE)
+}
+
+/// Finish the reading, then end; the run can be resumed.
+#[utoipa::path(post, path = "/finish", tag = "rig", responses((status = 204, description = "Asked for"),
+    (status = 409, body = Problem, content_type = "application/problem+json", description = "Nothing runs")))]
+async fn finish(State(shared): State<Shared>, Extension(by): Extension<Caller>) -> Done {
+    shared.daemon.finish(&by).await?;
     Ok(DONE)
 }
 
