@@ -47,6 +47,7 @@ pub fn run(program: &str, directory: &Path, arguments: &[&str]) -> Finished {
         .args(arguments)
         .current_dir(directory)
         .env_remove("RUST_LOG")
+        .env_remove("GONIOD_URL")
         .output();
     output
         .unwrap_or_else(|error| panic!("cannot start {program}: {error}"))

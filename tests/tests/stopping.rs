@@ -38,6 +38,7 @@ fn started(directory: &Path, kind: &str, events: usize) -> (Child, BufReader<std
         .args(RUN)
         .current_dir(directory)
         .env("RUST_LOG", "gonioctl=debug")
+        .env_remove("GONIOD_URL")
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

@@ -8,9 +8,10 @@ use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::{Child, ChildStderr, ChildStdout, Command, Stdio};
 
+use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use tempfile::TempDir;
-use tests::{Finished, run};
+use tests::{Captured, Finished, run};
 
 const GONIOCTL: &str = env!("CARGO_BIN_EXE_e2e-gonioctl");
 const GONIOD: &str = env!("CARGO_BIN_EXE_e2e-goniod");
@@ -104,11 +105,20 @@ struct Watcher {
 
 impl Watcher {
     fn of(service: &Service, job: &str) -> Self {
-        let mut child = service
-            .command(&["watch", job, "--json"])
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
+        Self::start(service.command(&["watch", job, "--json"]))
+    }
+
+    /// Of whatever happens from now on.
+    fn of_all(service: &Service) -> Self {
+        let mut command = service.command(&["watch", "--json"]);
+        let mut watcher = Self::start(command.stderr(Stdio::piped()));
+        let said = watcher.child.stderr.take().unwrap();
+        until(&mut BufReader::new(said), "watching");
+        watcher
+    }
+
+    fn start(mut command: impl std::borrow::BorrowMut<Command>) -> Self {
+        let mut child = command.borrow_mut().stdout(Stdio::piped()).spawn().unwrap();
         let lines = BufReader::new(child.stdout.take().unwrap());
         Self { child, lines }
     }
@@ -186,6 +196,97 @@ fn a_run_is_paused_stopped_and_gone_on_with() {
     let _ = service.gonioctl(&["watch", &id]).expect(0);
     let refused = service.gonioctl(&["resume"]).expect(5);
     assert!(refused.stderr.contains("nothing is paused"), "{}", refused.stderr);
+}
+
+#[test]
+fn run_has_the_daemon_do_it_and_an_interrupt_leaves_a_run_to_go_on_with() {
+    let service = Service::start(&["--listen", "127.0.0.1:0"]);
+    let here = service.directory.path();
+    let mut watcher = Watcher::of_all(&service);
+    let running = service
+        .command(&["run", "long.toml", "--rig", "rig.toml"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    watcher.readings(20);
+    let busy = service.gonioctl(&["run", "short.toml"]).expect(5);
+    assert!(busy.stderr.contains("gonioctl submit"), "{}", busy.stderr);
+    let id = Pid::from_raw(running.id().try_into().unwrap()).unwrap();
+    kill_process(id, Signal::INT).unwrap();
+    let stopped = Finished::from(running.wait_with_output().unwrap()).expect(4);
+    for said in [
+        "after this reading",
+        "the readings so far are safe",
+        "gonioctl resume",
+    ] {
+        assert!(stopped.stderr.contains(said), "{said}: {}", stopped.stderr);
+    }
+    let directory = Path::new(stopped.stdout.trim());
+    assert!(
+        directory.starts_with(here.join("data")),
+        "{}",
+        directory.display()
+    );
+    let before = Captured::read(directory);
+    assert!(before.readings().count() >= 20);
+    assert!(!directory.join("brdf.binary").exists());
+    assert!(!here.join("runs").exists(), "the run is the daemon's alone");
+
+    let resume = ["run", "--resume", stopped.stdout.trim(), "--json"];
+    let finished = service.gonioctl(&resume).expect(0);
+    let summary: Value = serde_json::from_str(&finished.stdout).unwrap();
+    assert_eq!(
+        (&summary["state"], &summary["exit_status"]),
+        (&"done".into(), &0.into())
+    );
+    let whole = Captured::read(directory);
+    let kept = before
+        .readings()
+        .all(|reading| whole.readings().any(|other| other == reading));
+    assert!(kept, "nothing was lost");
+    let accepted = whole.readings().filter(|reading| reading.accepted).count();
+    assert_eq!(summary["readings"]["planned"], accepted);
+    assert!(directory.join("brdf.binary").exists());
+    watcher.child.kill().unwrap();
+    watcher.child.wait().unwrap();
+}
+
+#[test]
+fn run_lays_the_specimen_on_the_stage_of_a_daemon_that_has_the_rig_and_of_no_other() {
+    let service = Service::start(&["--listen", "127.0.0.1:0"]);
+    let finished = service
+        .gonioctl(&["run", "short.toml", "--rig", "rig.toml"])
+        .expect(0);
+    assert!(
+        finished.stderr.contains("errors against the simulated specimen"),
+        "{}",
+        finished.stderr
+    );
+    let all: Value =
+        serde_json::from_str(&service.gonioctl(&["jobs", "--all", "--json"]).expect(0).stdout).unwrap();
+    assert_eq!(all[0]["state"], "done", "{all:#}");
+    fs::write(
+        service.directory.path().join("other.toml"),
+        "[envelope]\nseparation_deg = 7.0\n",
+    )
+    .unwrap();
+    let other = service
+        .gonioctl(&["run", "short.toml", "--rig", "other.toml"])
+        .expect(2);
+    assert!(other.stderr.contains("another rig"), "{}", other.stderr);
+    // Where a directory is given, the run is made there.
+    let alone = service
+        .gonioctl(&["run", "short.toml", "--rig", "rig.toml", "--out", "mine"])
+        .expect(0);
+    assert!(alone.stdout.starts_with("mine"), "{}", alone.stdout);
+    let bad = service.gonioctl(&["run", "missing.toml"]).expect(2);
+    assert!(bad.stderr.contains("missing.toml"), "{}", bad.stderr);
+    let nobody = ["run", "short.toml", "--daemon", "http://127.0.0.1:1"];
+    let _ = service.gonioctl(&nobody).expect(5);
+    let _ = service.gonioctl(&["estop"]).expect(0);
+    let latched = service.gonioctl(&["run", "short.toml"]).expect(5);
+    assert!(latched.stderr.contains("acknowledge"), "{}", latched.stderr);
 }
 
 #[test]

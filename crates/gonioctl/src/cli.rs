@@ -53,18 +53,22 @@ pub(crate) enum Command {
         output: Output,
     },
     /// Capture a job and reconstruct the BRDF.
+    ///
+    /// Where a daemon runs that has the rig, it does that, and keeps the run among its own; else this command does.
     Run {
         /// The job file.
         #[arg(required_unless_present = "resume", conflicts_with = "resume")]
         job: Option<PathBuf>,
         #[command(flatten)]
         rig: RigArgument,
-        /// Where run directories are made.
-        #[arg(long, value_name = "DIR", default_value = "runs", conflicts_with = "resume")]
-        out: PathBuf,
+        /// Where run directories are made [default: runs]. No daemon is asked where it is given.
+        #[arg(long, value_name = "DIR", conflicts_with = "resume")]
+        out: Option<PathBuf>,
         /// Go on with a run that was stopped or failed, from its directory.
         #[arg(long, value_name = "RUN_DIR")]
         resume: Option<PathBuf>,
+        #[command(flatten)]
+        daemon: DaemonArguments,
         #[command(flatten)]
         output: Output,
     },
@@ -295,14 +299,9 @@ pub(crate) struct RigArgument {
 /// Which daemon.
 #[derive(Debug, Args)]
 pub(crate) struct DaemonArguments {
-    /// Where the daemon listens: http://HOST:PORT or unix:PATH.
-    #[arg(
-        long,
-        value_name = "ADDRESS",
-        env = "GONIOD_URL",
-        default_value = "http://127.0.0.1:4664"
-    )]
-    pub(crate) daemon: String,
+    /// Where the daemon listens: http://HOST:PORT or unix:PATH [default: http://127.0.0.1:4664].
+    #[arg(long, value_name = "ADDRESS", env = "GONIOD_URL")]
+    pub(crate) daemon: Option<String>,
     /// File with a token, where the daemon wants one: the token alone, or the daemon's tokens.toml.
     #[arg(long, value_name = "FILE", env = "GONIOD_TOKEN_FILE")]
     pub(crate) token_file: Option<PathBuf>,

@@ -28,6 +28,9 @@ const CONNECT: Duration = Duration::from_secs(5);
 /// A quiet stream of events says every ten seconds that it lives; one that says nothing for so long is dead.
 const QUIET: Duration = Duration::from_secs(30);
 
+/// Where a daemon listens unless told otherwise.
+const USUAL: &str = "http://127.0.0.1:4664";
+
 /// What the address of a socket file begins with.
 const UNIX: &str = "unix:";
 
@@ -47,7 +50,8 @@ impl Daemon {
     /// # Errors
     /// An address that is none, a token file that holds none.
     pub(crate) fn new(arguments: &DaemonArguments) -> anyhow::Result<Self> {
-        let address = arguments.daemon.trim_end_matches('/').to_owned();
+        let address = arguments.daemon.as_deref().unwrap_or(USUAL);
+        let address = address.trim_end_matches('/').to_owned();
         // No proxy: the daemon is here, or at the end of a tunnel.
         let config = Agent::config_builder()
             .proxy(None)
@@ -85,6 +89,15 @@ impl Daemon {
     pub(crate) fn read<T: DeserializeOwned>(&self, path: &str) -> Result<T, ClientError> {
         let answer = self.send(Method::GET, path, &[], SendBody::none())?;
         self.decode(answer)
+    }
+
+    /// Reads the text at a path below the API.
+    ///
+    /// # Errors
+    /// As [`Daemon::read`].
+    pub(crate) fn read_text(&self, path: &str) -> Result<String, ClientError> {
+        let mut answer = self.send(Method::GET, path, &[], SendBody::none())?;
+        answer.read_to_string().map_err(|error| self.unreachable(error))
     }
 
     /// Asks for an act that has no answer but that it was done or asked for.
@@ -222,7 +235,7 @@ mod tests {
 
     fn arguments(daemon: &str) -> DaemonArguments {
         DaemonArguments {
-            daemon: daemon.to_owned(),
+            daemon: Some(daemon.to_owned()),
             token_file: None,
         }
     }

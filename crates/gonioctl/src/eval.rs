@@ -2,7 +2,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use brdf::{Brdf, MerlTable};
-use pdv::{Comparison, Draw, Metrics, compare};
+use pdv::{Draw, compare};
+use serde_json::Value;
 
 use crate::print;
 
@@ -13,6 +14,7 @@ use crate::print;
 pub(crate) fn eval(truth: &str, estimate: &str, as_json: bool) -> anyhow::Result<()> {
     let (truth, estimate) = (load(truth)?, load(estimate)?);
     let comparison = compare(&truth, &[&estimate], &Draw::default()).remove(0);
+    let comparison = serde_json::to_value(comparison)?;
     if as_json {
         print::json(&comparison)?;
     } else {
@@ -32,35 +34,35 @@ fn load(text: &str) -> Result<Arc<dyn Brdf>, brdf::Error> {
     brdf::specimen(text)
 }
 
-/// A comparison for people: one metric a line, all channels together and each by itself.
-pub(crate) fn lines(comparison: &Comparison) -> Vec<String> {
-    type Pick = fn(&Metrics) -> Option<f64>;
-    const ROWS: [(&str, Pick); 7] = [
-        ("male", |m| m.male),
-        ("median_rel", |m| m.median_rel),
-        ("p95_rel", |m| m.p95_rel),
-        ("rel_rms", |m| m.rel_rms),
-        ("log_rel_rmse", |m| m.log_rel_rmse),
-        ("eq4", |m| m.eq4),
-        ("eq4_black", |m| m.eq4_black),
+/// A comparison, as its JSON has it, for people: one metric a line, all channels together and each by itself.
+pub(crate) fn lines(comparison: &Value) -> Vec<String> {
+    const ROWS: [&str; 7] = [
+        "male",
+        "median_rel",
+        "p95_rel",
+        "rel_rms",
+        "log_rel_rmse",
+        "eq4",
+        "eq4_black",
     ];
-    let channels = &comparison.channels;
-    let columns = [&comparison.overall, &channels.r, &channels.g, &channels.b];
+    let channels = &comparison["channels"];
+    let columns = [comparison, &channels["r"], &channels["g"], &channels["b"]];
     let mut lines = vec![format!(
         "{:<13}{:>11}{:>11}{:>11}{:>11}",
         "", "all", "red", "green", "blue"
     )];
-    for (name, pick) in ROWS {
-        let cells = columns.map(|m| pick(m).map_or_else(|| "-".to_owned(), |v| format!("{v:.6}")));
+    for name in ROWS {
+        let cell = |value: f64| format!("{value:.6}");
+        let cells = columns.map(|column| column[name].as_f64().map_or_else(|| "-".to_owned(), cell));
         let [all, red, green, blue] = cells;
         lines.push(format!("{name:<13}{all:>11}{red:>11}{green:>11}{blue:>11}"));
     }
-    let overall = &comparison.overall;
+    let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
     lines.push(format!(
         "over {} pairs below {:.0}°, {:.1} % of those drawn left out",
-        overall.pairs,
-        comparison.draw.theta_max.to_degrees(),
-        100.0 * overall.left_out
+        comparison["pairs"],
+        number(&comparison["draw"]["theta_max"]).to_degrees(),
+        100.0 * number(&comparison["left_out"])
     ));
     lines
 }

@@ -25,6 +25,7 @@ fn status(error: &(dyn Error + 'static)) -> Option<Status> {
     if let Some(error) = error.downcast_ref::<ClientError>() {
         return Some(match error {
             ClientError::Refused(refused) if refused.invalid() => Status::Invalid,
+            ClientError::Unbegun { status, .. } => *status,
             _ => Status::Daemon,
         });
     }

@@ -5,9 +5,11 @@
 mod calibrate;
 mod campaign;
 mod cli;
+mod closing;
 mod conform;
 mod daemon;
 mod doctor;
+mod errand;
 mod eval;
 mod exit;
 mod export;
@@ -66,6 +68,7 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             rig,
             out,
             resume,
+            daemon,
             output,
         } => {
             let task = match (&job, &resume) {
@@ -79,11 +82,11 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
                 (Some(job), None) => Task::New {
                     job,
                     rig: rig.rig.as_deref(),
-                    out: &out,
+                    out: out.as_deref(),
                 },
                 (None, None) => unreachable!("clap requires one of them"),
             };
-            return run::run(&task, output.json);
+            return run::run(&task, &daemon, output.json);
         }
         Command::Calibrate(arguments) => return calibrate::calibrate(&arguments),
         Command::Submit { job, daemon, output } => queue::submit(&Daemon::new(&daemon)?, &job, output.json)?,

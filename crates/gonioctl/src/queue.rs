@@ -10,14 +10,22 @@ use crate::print;
 /// # Errors
 /// The file cannot be read, or is wrong; the daemon does not answer, or refuses.
 pub(crate) fn submit(daemon: &Daemon, file: &Path, as_json: bool) -> anyhow::Result<()> {
-    let text = goniod::job_text(file)?;
-    let path = format!("/jobs?name={}", encoded(&file.to_string_lossy()));
-    let job: Job = daemon.hand_in(&path, "application/toml", &text)?;
+    let job = hand_in(daemon, file)?;
     if as_json {
         return Ok(print::json(&job)?);
     }
     print::say(format_args!("{}: {}{}", job.specimen, job.state, advice(&job)));
     Ok(print::line(job.id)?)
+}
+
+/// Hands in a job file.
+///
+/// # Errors
+/// As [`submit`].
+pub(crate) fn hand_in(daemon: &Daemon, file: &Path) -> anyhow::Result<Job> {
+    let text = goniod::job_text(file)?;
+    let path = format!("/jobs?name={}", encoded(&file.to_string_lossy()));
+    Ok(daemon.hand_in(&path, "application/toml", &text)?)
 }
 
 /// Lists the jobs that are not over, or all.

@@ -2,14 +2,19 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use capture::{Command, Event, Outcome};
+use capture::{Command, Event};
 use goniod::{DaemonError, Ended, Order};
-use serde_json::json;
 use tokio::sync::watch;
 
-use crate::progress::{Progress, clock};
+use crate::cli::DaemonArguments;
+use crate::closing::Closing;
+use crate::errand::Errand;
+use crate::progress::Progress;
 use crate::signals::Signals;
-use crate::{eval, exit, print};
+use crate::{exit, print};
+
+/// Where run directories are made unless told otherwise.
+const RUNS: &str = "runs";
 
 /// What `run` is to do.
 pub(crate) enum Task<'a> {
@@ -17,18 +22,40 @@ pub(crate) enum Task<'a> {
     New {
         job: &'a Path,
         rig: Option<&'a Path>,
-        out: &'a Path,
+        /// Where its directory is made; `None`: nobody said.
+        out: Option<&'a Path>,
     },
     /// Go on with a run directory.
     Resume(&'a Path),
 }
 
-/// Captures, reconstructs and says where everything is.
+/// Captures, reconstructs and says where everything is; or has a daemon do that, where one has the rig.
 ///
 /// # Errors
 /// Whatever keeps the run from beginning, or its results from being written.
-pub(crate) fn run(task: &Task<'_>, json: bool) -> anyhow::Result<ExitCode> {
+pub(crate) fn run(task: &Task<'_>, daemon: &DaemonArguments, json: bool) -> anyhow::Result<ExitCode> {
     let begun = Instant::now();
+    let errand = match *task {
+        Task::New { job, rig, out: None } => Errand::begin(job, rig, daemon)?,
+        Task::New { .. } => None,
+        Task::Resume(directory) => Errand::resume(directory, daemon)?,
+    };
+    let closing = match errand {
+        Some(errand) => errand.wait()?,
+        None => alone(task)?,
+    };
+    let wall_s = begun.elapsed().as_secs_f64();
+    if json {
+        print::json(&closing.summary(wall_s))?;
+    } else {
+        closing.say(wall_s);
+        print::line(closing.directory.display())?;
+    }
+    Ok(exit::code(closing.status))
+}
+
+/// Does it in this process.
+fn alone(task: &Task<'_>) -> anyhow::Result<Closing> {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(1)
         .enable_all()
@@ -40,14 +67,7 @@ pub(crate) fn run(task: &Task<'_>, json: bool) -> anyhow::Result<ExitCode> {
         tokio::spawn(obey(signals, sender));
         capture(task, control).await
     })?;
-    let wall_s = begun.elapsed().as_secs_f64();
-    if json {
-        print::json(&summary(&ended, wall_s))?;
-    } else {
-        say(&ended, wall_s);
-        print::line(ended.directory.path().display())?;
-    }
-    Ok(exit::code(ended.status()))
+    Ok(Closing::of(&ended)?)
 }
 
 /// The first signal finishes the reading and holds, the second stops at once.
@@ -78,71 +98,10 @@ async fn capture(task: &Task<'_>, control: watch::Receiver<Command>) -> anyhow::
     let ended: Result<Ended, DaemonError> = match task {
         Task::New { job, rig, out } => {
             let order = Order::read(job, *rig)?;
-            goniod::run(&order, out, control, &mut show).await
+            goniod::run(&order, out.unwrap_or(Path::new(RUNS)), control, &mut show).await
         }
         Task::Resume(directory) => goniod::resume(directory, control, &mut show).await,
     };
     progress.finish();
     Ok(ended?)
-}
-
-/// The summary for machines.
-fn summary(ended: &Ended, wall_s: f64) -> serde_json::Value {
-    let run = &ended.report.run;
-    json!({
-        "id": run.id,
-        "state": run.state,
-        "exit_status": ended.status().code(),
-        "fault": run.fault,
-        "directory": ended.directory.path(),
-        "rig_seconds": run.seconds.total,
-        "wall_seconds": wall_s,
-        "readings": run.readings,
-        "retries": run.retries,
-        "flags": run.flags,
-        "errors": ended.report.errors,
-        "adapted": ended.report.adapted,
-    })
-}
-
-/// The summary for people.
-fn say(ended: &Ended, wall_s: f64) {
-    let run = &ended.report.run;
-    match &ended.outcome {
-        Outcome::Done => print::say("done"),
-        Outcome::Stopped => print::say("stopped; the readings so far are safe"),
-        Outcome::Failed { fault } => print::say(format_args!("failed: {fault}")),
-    }
-    print::say(format_args!(
-        "rig time  {} ({:.1} s; what a real rig takes)",
-        clock(run.seconds.total),
-        run.seconds.total
-    ));
-    print::say(format_args!("wall time {wall_s:.1} s"));
-    print::say(format_args!(
-        "readings  {} taken, {} of {} steps done, {} retries on the bus",
-        run.readings.taken, run.readings.accepted, run.readings.planned, run.retries
-    ));
-    if let Some(adapted) = &ended.report.adapted {
-        adapted
-            .added
-            .iter()
-            .for_each(|why| print::say(format_args!("added     {why}")));
-        adapted
-            .stopped
-            .iter()
-            .for_each(|why| print::say(format_args!("ended     {why}")));
-    }
-    if let Some(errors) = &ended.report.errors {
-        print::say("errors against the simulated specimen");
-        for line in eval::lines(errors) {
-            print::say(line);
-        }
-    }
-    if ended.outcome != Outcome::Done {
-        print::say(format_args!(
-            "go on with: gonioctl run --resume {}",
-            ended.directory.path().display()
-        ));
-    }
 }

@@ -17,27 +17,20 @@ const PAUSE: Duration = Duration::from_secs(1);
 /// # Errors
 /// The daemon does not answer from the first, or refuses.
 pub(crate) fn watch(daemon: &Daemon, job: Option<JobId>, as_json: bool) -> anyhow::Result<ExitCode> {
+    let mut watcher = Watcher::new(daemon, job, as_json);
     let mut stream = daemon.events(None)?;
-    let mut watcher = Watcher {
-        daemon,
-        job,
-        last: None,
-        screen: Screen::new(as_json),
-    };
     watcher.screen.say("watching");
-    loop {
-        match watcher.follow(&mut stream) {
-            Ok(Some(job)) => {
-                watcher.screen.finish();
-                return Ok(exit::code(watcher.status(&job)?));
-            }
-            Ok(None) | Err(ClientError::Unreachable { .. }) => {}
-            Err(error) => return Err(error.into()),
-        }
-        watcher.screen.say("lost the daemon; looking for it");
-        stream = watcher.again()?;
-        watcher.screen.say("the daemon is back");
-    }
+    let (_, status) = watcher.to_the_end(&mut stream)?;
+    Ok(exit::code(status))
+}
+
+/// Shows one job until it has ended, and how a command that ran it ends.
+///
+/// # Errors
+/// As [`watch`].
+pub(crate) fn until_ended(daemon: &Daemon, job: JobId) -> Result<(Job, Status), ClientError> {
+    let mut stream = daemon.events(None)?;
+    Watcher::new(daemon, Some(job), false).to_the_end(&mut stream)
 }
 
 struct Watcher<'a> {
@@ -48,7 +41,34 @@ struct Watcher<'a> {
     screen: Screen,
 }
 
-impl Watcher<'_> {
+impl<'a> Watcher<'a> {
+    fn new(daemon: &'a Daemon, job: Option<JobId>, as_json: bool) -> Self {
+        Self {
+            daemon,
+            job,
+            last: None,
+            screen: Screen::new(as_json),
+        }
+    }
+
+    /// Shows events until the job has ended; for ever where there is none.
+    fn to_the_end(&mut self, stream: &mut Stream) -> Result<(Job, Status), ClientError> {
+        loop {
+            match self.follow(stream) {
+                Ok(Some(job)) => {
+                    self.screen.finish();
+                    let status = self.status(&job)?;
+                    return Ok((job, status));
+                }
+                Ok(None) | Err(ClientError::Unreachable { .. }) => {}
+                Err(error) => return Err(error),
+            }
+            self.screen.say("lost the daemon; looking for it");
+            *stream = self.again()?;
+            self.screen.say("the daemon is back");
+        }
+    }
+
     /// Shows events until the job has ended, which is returned, or the stream has.
     fn follow(&mut self, stream: &mut Stream) -> Result<Option<Job>, ClientError> {
         if let Some(id) = self.job {
@@ -95,10 +115,9 @@ impl Watcher<'_> {
             JobState::Failed => Status::Invalid,
             JobState::Interrupted => {
                 let rig: Value = self.daemon.read("/rig")?;
-                if rig["fault"].is_null() {
-                    Status::Stopped
-                } else {
-                    Status::Rig
+                match rig["fault"]["code"].as_str() {
+                    None | Some("disk_full") => Status::Stopped,
+                    Some(_) => Status::Rig,
                 }
             }
             _ => Status::Stopped,

@@ -1,3 +1,4 @@
+use goniod::Status;
 use serde::Deserialize;
 use ureq::http::StatusCode;
 
@@ -20,6 +21,17 @@ pub(crate) enum ClientError {
     /// There is nothing to do it with.
     #[error("{0}")]
     Absent(&'static str),
+    /// It could not begin now.
+    #[error("the daemon cannot run this now: {0}")]
+    Busy(String),
+    /// A job ended before it had a run.
+    #[error("{why}")]
+    Unbegun {
+        /// What kept it from beginning.
+        why: String,
+        /// How the command ends.
+        status: Status,
+    },
     /// What it says is not what this version understands.
     #[error("the daemon at {address} says what this version of gonioctl does not understand")]
     Garbled {

@@ -1,0 +1,96 @@
+use std::path::PathBuf;
+
+use goniod::{Ended, Status};
+use serde_json::{Value, json};
+
+use crate::progress::clock;
+use crate::{eval, print};
+
+/// A run that has ended, as its files tell it; whoever captured it, the words are the same.
+pub(crate) struct Closing {
+    /// How the command ends.
+    pub(crate) status: Status,
+    /// Where everything is.
+    pub(crate) directory: PathBuf,
+    /// run.json; null where it could not be written.
+    pub(crate) run: Value,
+    /// report.json, likewise.
+    pub(crate) report: Value,
+    /// The command that goes on with it.
+    pub(crate) again: String,
+}
+
+impl Closing {
+    /// Of a run that this process captured.
+    ///
+    /// # Errors
+    /// None is known: all of it was written as JSON before.
+    pub(crate) fn of(ended: &Ended) -> serde_json::Result<Self> {
+        let directory = ended.directory.path();
+        Ok(Self {
+            status: ended.status(),
+            directory: directory.to_owned(),
+            run: serde_json::to_value(&ended.report.run)?,
+            report: serde_json::to_value(&ended.report)?,
+            again: format!("gonioctl run --resume {}", directory.display()),
+        })
+    }
+
+    /// The summary for machines.
+    pub(crate) fn summary(&self, wall_s: f64) -> Value {
+        let Self { run, report, .. } = self;
+        json!({
+            "id": run["id"],
+            "state": run["state"],
+            "exit_status": self.status.code(),
+            "fault": run["fault"],
+            "directory": self.directory,
+            "rig_seconds": run["seconds"]["total"],
+            "wall_seconds": wall_s,
+            "readings": run["readings"],
+            "retries": run["retries"],
+            "flags": run["flags"],
+            "errors": report["errors"],
+            "adapted": report["adapted"],
+        })
+    }
+
+    /// The summary for people.
+    pub(crate) fn say(&self, wall_s: f64) {
+        let Self { run, report, .. } = self;
+        match self.status {
+            Status::Done => print::say("done"),
+            Status::Stopped => print::say("stopped; the readings so far are safe"),
+            _ => print::say(format_args!(
+                "failed: {}",
+                run["fault"].as_str().unwrap_or("see above")
+            )),
+        }
+        let rig_s = run["seconds"]["total"].as_f64().unwrap_or_default();
+        print::say(format_args!(
+            "rig time  {} ({rig_s:.1} s; what a real rig takes)",
+            clock(rig_s)
+        ));
+        print::say(format_args!("wall time {wall_s:.1} s"));
+        let readings = &run["readings"];
+        print::say(format_args!(
+            "readings  {} taken, {} of {} steps done, {} retries on the bus",
+            readings["taken"], readings["accepted"], readings["planned"], run["retries"]
+        ));
+        for why in report["adapted"]["added"].as_array().into_iter().flatten() {
+            print::say(format_args!("added     {}", why.as_str().unwrap_or_default()));
+        }
+        if let Some(why) = report["adapted"]["stopped"].as_str() {
+            print::say(format_args!("ended     {why}"));
+        }
+        if !report["errors"].is_null() {
+            print::say("errors against the simulated specimen");
+            for line in eval::lines(&report["errors"]) {
+                print::say(line);
+            }
+        }
+        if self.status != Status::Done {
+            print::say(format_args!("go on with: {}", self.again));
+        }
+    }
+}

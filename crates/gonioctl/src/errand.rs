@@ -1,0 +1,183 @@
+use std::path::Path;
+use std::process;
+use std::sync::Arc;
+
+use capture::{FileJournal, Record};
+use goniod::{Job, JobId, JobState, Order, RunView, Status};
+use rig::RigFile;
+use serde_json::Value;
+use ureq::http::StatusCode;
+
+use crate::cli::DaemonArguments;
+use crate::closing::Closing;
+use crate::daemon::{ClientError, Daemon};
+use crate::signals::Signals;
+use crate::{print, queue, watch};
+
+/// A job that a daemon carries out while its client waits.
+pub(crate) struct Errand {
+    daemon: Arc<Daemon>,
+    job: JobId,
+}
+
+impl Errand {
+    /// Hands a job file to the daemon that has its rig: the daemon that is named, else the one at the usual address
+    /// where it runs and its rig file says the same. `None`: there is no such daemon.
+    ///
+    /// # Errors
+    /// A file that is wrong; a daemon that is named and not there, has another rig, or refuses; one that is busy.
+    pub(crate) fn begin(
+        job: &Path,
+        rig: Option<&Path>,
+        arguments: &DaemonArguments,
+    ) -> anyhow::Result<Option<Self>> {
+        let daemon = Daemon::new(arguments)?;
+        let text = match daemon.read_text("/rig/file") {
+            Err(ClientError::Unreachable { .. }) if arguments.daemon.is_none() => return Ok(None),
+            text => text?,
+        };
+        if arguments.daemon.is_none() || rig.is_some() {
+            let order = Order::read(job, rig)?;
+            if RigFile::parse(&text, "the daemon's rig file".as_ref()).ok() != Some(order.rig) {
+                anyhow::ensure!(
+                    arguments.daemon.is_none(),
+                    "--rig: the daemon drives another rig than {}",
+                    order.rig_name
+                );
+                print::say(format_args!(
+                    "the daemon drives another rig than {}; it is not asked",
+                    order.rig_name
+                ));
+                return Ok(None);
+            }
+        }
+        free(&daemon)?;
+        let job = queue::hand_in(&daemon, job)?.id;
+        start(&daemon, job)?;
+        Ok(Some(Self {
+            daemon: Arc::new(daemon),
+            job,
+        }))
+    }
+
+    /// Has the daemon go on with a run that it began. `None`: it did not begin it, or the run is over.
+    ///
+    /// # Errors
+    /// A daemon that is named and not there, or refuses.
+    pub(crate) fn resume(directory: &Path, arguments: &DaemonArguments) -> anyhow::Result<Option<Self>> {
+        // What is wrong with a directory is told by who goes on without a daemon.
+        let records = FileJournal::read(directory.join("journal")).unwrap_or_default();
+        let Some(Record::Header(header)) = records.first() else {
+            return Ok(None);
+        };
+        let daemon = Daemon::new(arguments)?;
+        let run: RunView = match daemon.read(&format!("/runs/{}", header.run)) {
+            Err(ClientError::Unreachable { .. }) if arguments.daemon.is_none() => return Ok(None),
+            Err(ClientError::Refused(refused)) if refused.status == StatusCode::NOT_FOUND => return Ok(None),
+            run => run?,
+        };
+        let job: Job = daemon.read(&format!("/jobs/{}", run.job))?;
+        if job.state.over() {
+            return Ok(None);
+        }
+        let _: Job = daemon.ask(&format!("/jobs/{}/resume", job.id))?;
+        Ok(Some(Self {
+            daemon: Arc::new(daemon),
+            job: job.id,
+        }))
+    }
+
+    /// Shows how it goes on until it has ended, and obeys signals: the first one stops the job, the second one is the
+    /// emergency stop.
+    ///
+    /// # Errors
+    /// A job that never began, and why; a daemon that refuses.
+    pub(crate) fn wait(self) -> anyhow::Result<Closing> {
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build()?;
+        let signals = {
+            let _within = runtime.enter();
+            Signals::listen()?
+        };
+        runtime.spawn(obey(signals, self.daemon.clone()));
+        let (job, status) = watch::until_ended(&self.daemon, self.job)?;
+        let Some(id) = job.run else {
+            let why = job.why.unwrap_or_else(|| format!("the job is {}", job.state));
+            return Err(ClientError::Unbegun { why, status }.into());
+        };
+        let run: RunView = self.daemon.read(&format!("/runs/{id}"))?;
+        // They are missing where they could not be written; the fault that says so was told.
+        let file = |name: &str| -> Value {
+            let told = self.daemon.read(&format!("/runs/{id}/files/{name}"));
+            told.unwrap_or_default()
+        };
+        Ok(Closing {
+            status,
+            directory: run.directory,
+            run: file("run.json"),
+            report: file("report.json"),
+            again: format!("gonioctl resume {}", job.id),
+        })
+    }
+}
+
+/// Whether a daemon could begin a job now: `run` waits for nobody.
+fn free(daemon: &Daemon) -> anyhow::Result<()> {
+    let rig: Value = daemon.read("/rig")?;
+    if let Some(why) = rig["fault"]["text"].as_str() {
+        return Err(ClientError::Busy(format!(
+            "a fault is latched ({why}): look at the rig, then `gonioctl acknowledge`"
+        ))
+        .into());
+    }
+    let jobs: Vec<Job> = daemon.read("/jobs")?;
+    let before = |job: &&Job| !job.state.over() && job.state != JobState::Interrupted;
+    match jobs.iter().find(before) {
+        Some(job) => Err(ClientError::Busy(format!(
+            "job {} is {}: wait for it (`gonioctl watch`), or queue this one with `gonioctl submit`",
+            job.id, job.state
+        ))
+        .into()),
+        None => Ok(()),
+    }
+}
+
+/// Says that the specimen is on the stage: whoever says `run` has put it there. A job that cannot start is taken back.
+fn start(daemon: &Daemon, id: JobId) -> Result<(), ClientError> {
+    let Err(refusal) = daemon.ask::<Job>(&format!("/jobs/{id}/ready")) else {
+        return Ok(());
+    };
+    // One whose file says that it lies there has set off by itself.
+    let job: Job = daemon.read(&format!("/jobs/{id}"))?;
+    if !matches!(job.state, JobState::Queued | JobState::AwaitingSpecimen) {
+        return Ok(());
+    }
+    let _: Job = daemon.ask(&format!("/jobs/{id}/cancel"))?;
+    Err(refusal)
+}
+
+async fn obey(mut signals: Signals, daemon: Arc<Daemon>) {
+    let steps = [
+        (
+            "/finish",
+            "stopping after this reading; again for an emergency stop",
+        ),
+        ("/estop", "emergency stop"),
+    ];
+    for (path, word) in steps {
+        signals.next().await;
+        print::say(word);
+        let daemon = daemon.clone();
+        // Not waited for: the emergency stop must not wait for an answer to what was asked before.
+        tokio::task::spawn_blocking(move || {
+            let Err(error) = daemon.act(path) else { return };
+            print::say(format_args!("gonioctl: {error}"));
+            if matches!(error, ClientError::Unreachable { .. }) {
+                // Nobody is there who could obey; the rig's own watchdogs stop it.
+                process::exit(Status::Daemon.code().into());
+            }
+        });
+    }
+}
