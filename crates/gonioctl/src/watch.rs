@@ -20,7 +20,7 @@ pub(crate) fn watch(daemon: &Daemon, job: Option<JobId>, as_json: bool) -> anyho
     let mut watcher = Watcher::new(daemon, job, as_json);
     let mut stream = daemon.events(None)?;
     watcher.screen.say("watching");
-    let (_, status) = watcher.to_the_end(&mut stream)?;
+    let (_, status) = watcher.until_end(&mut stream)?;
     Ok(exit::code(status))
 }
 
@@ -30,7 +30,7 @@ pub(crate) fn watch(daemon: &Daemon, job: Option<JobId>, as_json: bool) -> anyho
 /// As [`watch`].
 pub(crate) fn until_ended(daemon: &Daemon, job: JobId) -> Result<(Job, Status), ClientError> {
     let mut stream = daemon.events(None)?;
-    Watcher::new(daemon, Some(job), false).to_the_end(&mut stream)
+    Watcher::new(daemon, Some(job), false).until_end(&mut stream)
 }
 
 struct Watcher<'a> {
@@ -52,7 +52,7 @@ impl<'a> Watcher<'a> {
     }
 
     /// Shows events until the job has ended; for ever where there is none.
-    fn to_the_end(&mut self, stream: &mut Stream) -> Result<(Job, Status), ClientError> {
+    fn until_end(&mut self, stream: &mut Stream) -> Result<(Job, Status), ClientError> {
         loop {
             match self.follow(stream) {
                 Ok(Some(job)) => {
