@@ -69,9 +69,17 @@ pub(crate) async fn until<T>(events: &mut Events, mut found: impl FnMut(&Event) 
 }
 
 /// Waits until a job is in a state.
+///
+/// # Panics
+/// If it ends in another.
 pub(crate) async fn state(events: &mut Events, id: goniod::JobId, state: JobState) -> Job {
     until(events, |event| match &event.what {
         What::Job { job } if job.id == id && job.state == state => Some((**job).clone()),
+        What::Job { job } if job.id == id => {
+            let ended = job.state.over() || job.state == JobState::Interrupted;
+            assert!(!ended, "not {state}: {job:?}");
+            None
+        }
         _ => None,
     })
     .await
