@@ -10,12 +10,16 @@ use crate::{Fault, FaultKind, Rig};
 /// Pause before a request is repeated: lets time pass where a failure takes none, and a burst of noise end.
 const PAUSE: Duration = Duration::from_millis(1);
 
+/// Repetitions before a device counts as silent, however long that took: a host that stood still for a while has asked
+/// too seldom to tell.
+pub(super) const LEAST: u32 = 4;
+
 /// A request to a rig that may be repeated.
 pub(super) type Attempt<'a, T, E> = Pin<Box<dyn Future<Output = Result<T, E>> + Send + 'a>>;
 
 impl<R: Rig> Drive<R> {
     /// Repeats a request until it succeeds, fails in a way that repeating cannot mend, or its device has been silent
-    /// for the rig file's `silence_ms`. Each repetition is counted.
+    /// for the rig file's `silence_ms` and a few repetitions. Each repetition is counted.
     pub(super) async fn retry<T>(
         &mut self,
         what: &'static str,
@@ -60,7 +64,8 @@ impl Patience {
         error: E,
     ) -> Result<(), DriveError<E>> {
         let tried = self.since.elapsed();
-        if error.kind() != FaultKind::NoReply || tried >= self.silence {
+        let silent = tried >= self.silence && self.retries >= LEAST;
+        if error.kind() != FaultKind::NoReply || silent {
             return Err(DriveError::Device {
                 what,
                 retries: self.retries,
@@ -72,5 +77,45 @@ impl Patience {
         self.retries += 1;
         tokio::time::sleep(PAUSE).await;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Device, RigError};
+
+    #[tokio::test(start_paused = true)]
+    async fn a_host_that_stood_still_asks_again() {
+        let mut patience = Patience::new(Duration::from_millis(500));
+        let silent = || RigError::NoReply {
+            device: Device::Sensor,
+            id: 2,
+        };
+        for _ in 0..LEAST {
+            tokio::time::sleep(Duration::from_millis(600)).await;
+            patience
+                .spend("look", silent())
+                .await
+                .expect("it was hardly asked");
+        }
+        let error = patience
+            .spend("look", silent())
+            .await
+            .expect_err("it was asked often enough");
+        assert!(error.to_string().contains("tried 5 times"), "{error}");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn a_device_that_is_asked_often_has_its_time() {
+        let mut patience = Patience::new(Duration::from_millis(500));
+        let begun = Instant::now();
+        let silent = || RigError::NoReply {
+            device: Device::Light,
+            id: 1,
+        };
+        while patience.spend("look", silent()).await.is_ok() {}
+        let took = begun.elapsed();
+        assert!((500..510).contains(&took.as_millis()), "{took:?}");
     }
 }

@@ -3,6 +3,7 @@ use std::time::Duration;
 use arms::{Arm, ArmAngle, Envelope, Pose};
 use tokio::time::Instant;
 
+use super::retry::LEAST;
 use super::{Drive, DriveError};
 use crate::{Approach, Rig, Snapshot};
 
@@ -138,6 +139,7 @@ impl<R: Rig> Drive<R> {
     /// Sets both arms off. The sync write is not acknowledged, so it is repeated until the goals read back.
     pub(super) async fn start(&mut self, goal: Pose) -> Result<(), DriveError<R::Error>> {
         let since = Instant::now();
+        let mut repeated = 0;
         loop {
             self.retry("set the arms off", |rig| Box::pin(rig.start(goal)))
                 .await?;
@@ -147,7 +149,7 @@ impl<R: Rig> Drive<R> {
                 (snapshot.arms[arm as usize].goal - goal.angle(arm)).abs() > half_a_count
             });
             let Some(arm) = not_taken else { return Ok(()) };
-            if since.elapsed() >= self.file.bus.silence {
+            if since.elapsed() >= self.file.bus.silence && repeated >= LEAST {
                 return Err(DriveError::GoalNotTaken {
                     arm,
                     goal: goal.angle(arm),
@@ -156,6 +158,7 @@ impl<R: Rig> Drive<R> {
                 });
             }
             self.retries += 1;
+            repeated += 1;
             self.wait(POLL).await?;
         }
     }
