@@ -19,12 +19,20 @@ impl Service {
     /// # Panics
     /// If the program cannot be started.
     pub fn start(program: &str, rig: &Path, data: &Path) -> Self {
-        let mut child = Command::new(program)
+        Self::start_by(Command::new(program), rig, data)
+    }
+
+    /// Starts it by a command that hands on to it the arguments that follow.
+    ///
+    /// # Panics
+    /// If the command cannot be started.
+    pub fn start_by(mut command: Command, rig: &Path, data: &Path) -> Self {
+        let mut child = command
             .args([rig, data])
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
-            .unwrap_or_else(|error| panic!("cannot start {program}: {error}"));
+            .unwrap_or_else(|error| panic!("cannot start {command:?}: {error}"));
         let out = child.stdout.take().expect("it is piped");
         let (tell, said) = channel();
         std::thread::spawn(move || {
