@@ -309,6 +309,24 @@ impl<'a, R: Rig> Execution<'a, R> {
         Ok(counts)
     }
 
+    /// A reading of a step as it is first known: it does not count yet, and nothing is said against it.
+    fn taken(&mut self, step: &Step, counts: Counts, measured: Pose) -> Reading {
+        Reading {
+            step: step.index,
+            attempt: self.attempts[step.index],
+            accepted: false,
+            sweep: step.sweep,
+            lamp: step.lamp,
+            goal: step.pose(),
+            measured,
+            counts,
+            device_ticks: self.clock.unwrap(counts.ticks),
+            retries: 0,
+            flags: Vec::new(),
+            swept_rad: None,
+        }
+    }
+
     /// Records a reading of arms at rest, `retries` being the requests repeated before it; returns those after it.
     async fn rested(
         &mut self,
@@ -319,20 +337,9 @@ impl<'a, R: Rig> Execution<'a, R> {
         retries: u32,
     ) -> Result<u32, Interrupt<R::Error>> {
         let now = self.drive.retries();
-        let mut reading = Reading {
-            step: step.index,
-            attempt: self.attempts[step.index],
-            accepted,
-            sweep: step.sweep,
-            lamp: step.lamp,
-            goal: step.pose(),
-            measured,
-            counts,
-            device_ticks: self.clock.unwrap(counts.ticks),
-            retries: now - retries,
-            flags: Vec::new(),
-            swept_rad: None,
-        };
+        let mut reading = self.taken(step, counts, measured);
+        reading.accepted = accepted;
+        reading.retries = now - retries;
         reading.flags = self.flags(&reading);
         self.record(reading, step).await?;
         Ok(now)

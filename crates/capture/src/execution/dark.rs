@@ -44,7 +44,7 @@ impl<R: Rig> Execution<'_, R> {
         let before = self.drive.snapshot().await?.pose();
         let counts = self.drive.expose(exposure).await?;
         let after = self.drive.snapshot().await?.pose();
-        let mut reading = self.aloft(step, counts, middle(before, after));
+        let mut reading = self.taken(step, counts, middle(before, after));
         reading.accepted = true;
         reading.retries = self.drive.retries() - retries;
         reading.swept_rad = Some(Arm::BOTH.map(|arm| after.angle(arm) - before.angle(arm)));

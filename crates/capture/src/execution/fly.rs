@@ -127,7 +127,9 @@ impl<R: Rig> Execution<'_, R> {
             self.heed_lamp(&counts)?;
             let idle = after_s - now_s - ahead.as_secs_f64() - 2.0 * half_s;
             flight.idled(idle);
-            let mut reading = self.aloft(step, counts, seen.snapshot.pose());
+            let mut reading = self.taken(step, counts, seen.snapshot.pose());
+            // Where it was is not known before it has landed.
+            reading.flags = vec![Flag::Blurred];
             reading.retries = self.drive.retries() - retries;
             retries = self.drive.retries();
             ranging.learn(&reading);
@@ -209,25 +211,6 @@ impl<R: Rig> Execution<'_, R> {
                 return Err(wrong("still integrating".to_owned()).into());
             }
             left = exposure.duration().saturating_sub(passed);
-        }
-    }
-
-    /// A reading as it is known in flight; it does not count yet.
-    pub(super) fn aloft(&mut self, step: &Step, counts: Counts, measured: Pose) -> Reading {
-        Reading {
-            step: step.index,
-            attempt: self.attempts[step.index],
-            accepted: false,
-            sweep: step.sweep,
-            lamp: step.lamp,
-            goal: step.pose(),
-            measured,
-            counts,
-            device_ticks: self.clock.unwrap(counts.ticks),
-            retries: 0,
-            // Where it was is not known before it has landed.
-            flags: vec![Flag::Blurred],
-            swept_rad: None,
         }
     }
 
