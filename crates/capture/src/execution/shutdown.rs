@@ -52,15 +52,15 @@ impl<R: Rig> Execution<'_, R> {
         let mut unsafe_left = match result {
             _ if !self.touched => Vec::new(),
             _ if at_rest => self.drive.disengage_all().await,
-            Err(Interrupt::Estop) => self.halt().await,
-            _ => self.stop().await,
+            Err(Interrupt::Estop) => self.arrest(true).await,
+            _ => self.arrest(false).await,
         };
         // An emergency stop that comes while it shuts down is one all the same.
         let late = matches!(result, Ok(()) | Err(Interrupt::Finish | Interrupt::Stop))
             && *self.control.borrow() == Command::Estop;
         let result = match late {
             true => {
-                unsafe_left.extend(self.halt().await);
+                unsafe_left.extend(self.arrest(true).await);
                 Err(Interrupt::Estop)
             }
             false => result,
@@ -112,25 +112,20 @@ impl<R: Rig> Execution<'_, R> {
 
     /// Makes the rig safe after a panic; the journal is left as it is.
     pub(crate) async fn abandon(mut self) {
-        for error in self.stop().await {
+        for error in self.arrest(false).await {
             tracing::warn!("while shutting down: {}", chain(&error));
         }
     }
 
-    async fn halt(&mut self) -> Vec<DriveError<R::Error>> {
+    /// Stops the arms, on their profiles or at once, lamp off, and lets go of them.
+    async fn arrest(&mut self, at_once: bool) -> Vec<DriveError<R::Error>> {
         if !self.touched {
             return Vec::new();
         }
-        let mut failed = self.drive.halt_all().await;
-        failed.extend(self.drive.disengage_all().await);
-        failed
-    }
-
-    async fn stop(&mut self) -> Vec<DriveError<R::Error>> {
-        if !self.touched {
-            return Vec::new();
-        }
-        let mut failed = self.drive.stop_all().await;
+        let mut failed = match at_once {
+            true => self.drive.halt_all().await,
+            false => self.drive.stop_all().await,
+        };
         failed.extend(self.drive.disengage_all().await);
         failed
     }
