@@ -41,7 +41,7 @@ fn needed_us(file: &RigFile, rate: f64, gain: Gain) -> f64 {
         0.0 => 0.0,
         electrons => (1.0 / rate + 1.0 / monitor) / electrons,
     };
-    let converter = known.read_noise_counts.powi(2) + 1.0 / 12.0;
+    let converter = known.variance(0.0, gain.factor());
     let b = converter * ((rate * gain.factor()).powi(-2) + monitor.powi(-2));
     let allowed = file.photometer.flight_noise_rel.powi(2);
     (a + (a * a + 4.0 * allowed * b).sqrt()) / (2.0 * allowed)
