@@ -10,6 +10,7 @@ use sweep::SweepError;
 use toml::Spanned;
 
 use crate::DaemonError;
+use crate::order::read;
 
 /// Cells along either zenith angle: 5° each.
 const BINS: usize = 18;
@@ -174,14 +175,6 @@ impl Histogram {
         let cells = (0..BINS).flat_map(|i| (0..BINS).filter_map(move |o| cell(i, o)));
         cells.collect::<Vec<_>>().join(", ")
     }
-}
-
-fn read<T>(what: &'static str, path: &Path, how: impl Fn(&Path) -> io::Result<T>) -> Result<T, DaemonError> {
-    how(path).map_err(|source| DaemonError::Read {
-        what,
-        path: path.to_owned(),
-        source,
-    })
 }
 
 fn line(text: &str, span: &Range<usize>) -> usize {

@@ -1,5 +1,6 @@
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
+use std::{fs, io};
 
 use arms::Pose;
 use capture::Header;
@@ -29,8 +30,8 @@ pub struct Order {
 }
 
 impl Order {
-    /// Reads a job file, with the histogram that it may name, and a rig file: the one named, else config/rig.toml in the working directory if there is one,
-    /// else the built-in one.
+    /// Reads a job file, with the histogram that it may name, and a rig file: the one named, else config/rig.toml in the
+    /// working directory if there is one, else the built-in one.
     ///
     /// # Errors
     /// A file that cannot be read, or what is wrong in it with its place.
@@ -113,16 +114,28 @@ impl Order {
 /// The file cannot be read.
 pub fn rig_text(rig: Option<&Path>) -> Result<(String, PathBuf), DaemonError> {
     match rig {
-        Some(path) => Ok((read("rig file", path)?, path.to_owned())),
+        Some(path) => Ok((
+            read("rig file", path, |path| fs::read_to_string(path))?,
+            path.to_owned(),
+        )),
         None if Path::new(RIG_HERE).exists() => {
-            Ok((read("rig file", Path::new(RIG_HERE))?, PathBuf::from(RIG_HERE)))
+            let here = Path::new(RIG_HERE);
+            Ok((
+                read("rig file", here, |path| fs::read_to_string(path))?,
+                here.to_owned(),
+            ))
         }
         None => Ok((RigFile::BUILT_IN.to_owned(), PathBuf::from("built-in rig file"))),
     }
 }
 
-fn read(what: &'static str, path: &Path) -> Result<String, DaemonError> {
-    std::fs::read_to_string(path).map_err(|source| DaemonError::Read {
+/// Reads a file of an order, which the error names.
+pub(crate) fn read<T>(
+    what: &'static str,
+    path: &Path,
+    how: impl Fn(&Path) -> io::Result<T>,
+) -> Result<T, DaemonError> {
+    how(path).map_err(|source| DaemonError::Read {
         what,
         path: path.to_owned(),
         source,
