@@ -22,7 +22,8 @@ const DARK_REPEATS: usize = 4;
 /// value in it is made of are left out.
 ///
 /// In flight each sweep is passed there and back, every pose a step of both, so that what play and lateness add in one
-/// direction the other takes away. The first dark readings are taken on the way to it. A sweep whose arms would not move alike is stepped, and the plan says so.
+/// direction the other takes away. The first dark readings are taken on the way to it. A sweep whose arms would not move
+/// alike is stepped, and the plan says so.
 ///
 /// # Errors
 /// The arms stand outside the envelope; a sweep of which nothing can be measured on this rig, with its key and why; a
