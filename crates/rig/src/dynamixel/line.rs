@@ -124,8 +124,8 @@ impl Line {
 
     /// Sends a packet and collects its replies.
     ///
-    /// `dynamixel2` 0.9.1 panics on a reply that claims to be shorter than a status packet can be; such a reply is
-    /// damage like any other, and the crate's state is made anew.
+    /// `dynamixel2` 0.9.1 panics on a reply that claims to be shorter than a status packet can be (its length field below
+    /// 4); such a reply is damage like any other, and the crate's state is made anew.
     pub(super) fn transact(&mut self, request: &Request) -> Result<Vec<Reply>, Failure> {
         if let Some(quiet) = self.quiet_until.take() {
             std::thread::sleep(quiet.saturating_duration_since(Instant::now()));
@@ -170,7 +170,9 @@ impl Line {
         })?;
         let mut replies = Vec::with_capacity(request.replies.len());
         for &(id, count) in &request.replies {
-            let (answered, reply) = self.receive(deadline).map_err(|cause| Failure { id, cause })?;
+            let (answered, reply) = self
+                .receive_fresh(deadline)
+                .map_err(|cause| Failure { id, cause })?;
             let found = reply.parameters.len();
             let cause = if answered == id && found == count {
                 replies.push(reply);
@@ -181,7 +183,7 @@ impl Line {
                 // The next device of a bulk read spoke up: this one has missed its turn.
                 Cause::Silence
             } else {
-                Cause::Damage(format!("id {answered} answered instead"))
+                stranger(answered)
             };
             return Err(Failure { id, cause });
         }
@@ -203,10 +205,23 @@ impl Line {
                 Ok((answered, reply)) if answered == id && reply.parameters.len() == PING_REPLY => {
                     return Ok(());
                 }
+                Ok((answered, _)) if !self.suspects.contains(&answered) => return Err(stranger(answered)),
                 Ok(_) | Err(Cause::Refusal(_)) => {}
                 // Not passed over: of a reply that claims to be too long, the crate tells again and again.
                 Err(cause) => return Err(cause),
             }
+        }
+    }
+
+    /// The next status packet of a device that owes none. Those whom the request in hand asks have caught up; what a
+    /// suspect says now answers an earlier request, late, and is passed over.
+    fn receive_fresh(&mut self, deadline: Instant) -> Result<(u8, Reply), Cause> {
+        loop {
+            let (answered, reply) = self.receive(deadline)?;
+            if !self.suspects.contains(&answered) {
+                return Ok((answered, reply));
+            }
+            tracing::debug!(id = answered, "late reply passed over");
         }
     }
 
@@ -279,6 +294,11 @@ impl Line {
         let wire = Duration::from_secs_f64(bytes * 10.0 / f64::from(self.settings.baud));
         wire + RETURN_DELAY_MAX * request.replies.len() as u32 + self.settings.latency + HOST_MARGIN
     }
+}
+
+/// A reply of a device that was not asked.
+fn stranger(id: u8) -> Cause {
+    Cause::Damage(format!("id {id} answered instead"))
 }
 
 fn bus(lock: &TTYPort) -> Result<Bus<Vec<u8>, Vec<u8>>, serialport::Error> {
