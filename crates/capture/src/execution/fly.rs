@@ -1,13 +1,12 @@
 use std::time::Duration;
 
-use arms::Pose;
 use rig::{Counts, DriveError, Exposure, Observation, Rig};
 use sweep::Step;
 
 use super::{Execution, Interrupt, TICKS_PER_S};
 use crate::exposure::{Ranging, brief};
 use crate::flight::Flight;
-use crate::{Command, Event, Flag, Reading, blur};
+use crate::{Command, Event, Flag, blur};
 
 /// Time between two observations of arms in flight, where the bus has nothing else to do: enough of them for where the arms
 /// were to be known better than their encoders show it.
