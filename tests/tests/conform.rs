@@ -73,6 +73,29 @@ fn the_simulator_passes_and_is_left_at_rest() {
     );
 }
 
+/// At rest the specimen is seen by its mirror direction or from beside it: the exposures are found either way.
+#[test]
+fn a_bent_photometer_is_told_from_a_straight_one() {
+    for specimen in ["gold-paint", "lambert:0.5"] {
+        for (lost, expected) in [(0.0, "ok"), (0.05, "warn")] {
+            let simulator = Simulator::new(&format!(
+                "[sim]\nspecimen = \"{specimen}\"\nnonlinearity = {lost}\n"
+            ));
+            let (_, findings) = suite(&simulator);
+            let found = findings.iter().find(|finding| finding["check"] == "linearity");
+            println!("{specimen}, {lost} lost at full scale: {found:?}");
+            assert_eq!(verdict(&findings, "linearity"), expected, "{specimen}, {lost}");
+        }
+    }
+}
+
+#[test]
+fn a_specimen_too_dark_to_tell_is_no_proof_of_linearity() {
+    let simulator = Simulator::new("[sim]\nspecimen = \"black\"\n");
+    let (_, findings) = suite(&simulator);
+    assert_eq!(verdict(&findings, "linearity"), "warn", "{findings:#?}");
+}
+
 #[test]
 fn an_arm_that_lags_behind_its_profile_is_found() {
     let simulator = Simulator::new("[motion]\ntimeout_ms = 3000\n[sim]\nfollowing_lag_ms = 200.0\n");

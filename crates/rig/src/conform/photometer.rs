@@ -8,14 +8,15 @@ const READINGS: usize = 16;
 /// Noise, of full scale, that leaves nothing to be measured.
 const NOISE_MAX: f64 = 0.01;
 
-/// Exposures that are compared, each twice as long as the one before.
-const DOUBLINGS: u32 = 6;
+/// Exposures that are compared, each twice as long as the one before. The shortest still collects some ten thousand
+/// electrons, so that over all ladders its noise stays well below what is worth a correction.
+const DOUBLINGS: u32 = 4;
 
 /// Deviation from proportion to time that is worth a correction, and one that no correction mends.
 const BENT: f64 = 0.01;
 const BROKEN: f64 = 0.1;
 
-/// Share of full scale that the longest exposure may fill.
+/// Share of full scale that the longest exposure fills where there is light enough: what is bent shows there.
 const FULL: f64 = 0.8;
 
 /// Standard deviation of dark readings at each gain.
@@ -50,24 +51,24 @@ pub(super) async fn noise(drive: &mut Drive<Dynamixel>) -> Result<Vec<Finding>> 
     Ok(findings)
 }
 
+/// Share of full scale below which a photometer that is bent seems straight, and noise seems to be bent.
+const DIM: f64 = 0.4;
+
 /// Times that the exposures are gone through: the lamp wobbles by some thousandths, and takes seconds for it.
-const LADDERS: u32 = 8;
+const LADDERS: u32 = 32;
 
 /// Whether the counts of every channel grow in proportion to the integration time; the lamp is on.
 pub(super) async fn linearity(drive: &mut Drive<Dynamixel>) -> Result<Finding> {
     const CHECK: &str = "linearity";
     let settings = drive.file().photometer.clone();
     drive.wait(settings.lamp_warm_up).await?;
-    let gain = Gain::X1;
-    let integration_us = settings.integration_min_us;
-    let probe = drive.expose(Exposure { integration_us, gain }).await?;
-    let brightest = channels(&probe).into_iter().fold(1.0, f64::max);
-    let full = FULL * f64::from(settings.full_scale);
-    let longest_us =
-        (f64::from(integration_us) * full / brightest).min(f64::from(settings.integration_max_us));
+    let Exposure {
+        integration_us: longest_us,
+        gain,
+    } = filling(drive).await?;
     let mut taken: Vec<Mean> = (0..DOUBLINGS)
         .rev()
-        .map(|halving| (longest_us / f64::from(1 << halving)) as u32)
+        .map(|halving| longest_us >> halving)
         .filter(|&integration_us| integration_us >= settings.integration_min_us)
         .map(|integration_us| Mean {
             integration_us,
@@ -90,15 +91,29 @@ pub(super) async fn linearity(drive: &mut Drive<Dynamixel>) -> Result<Finding> {
             "correct [photometer]",
         ));
     };
-    let telling = |&channel: &usize| last.counts[channel] >= f64::from(settings.enough);
-    let worst = (0..4)
+    let light = brightest(&last.counts);
+    let share = light / f64::from(settings.full_scale);
+    if share < DIM {
+        return Ok(Finding::warn(
+            CHECK,
+            format!(
+                "not looked at: the longest exposure fills {:.1} % of the range",
+                100.0 * share
+            ),
+            "a brighter specimen or lamp, or a larger photometer.integration_max_us",
+        ));
+    }
+    // A faint colour is noisier, and does not reach to where it would bend.
+    let telling = |&channel: &usize| channel == MONITOR || last.counts[channel] >= light / 2.0;
+    let worst = (0..=MONITOR)
         .filter(telling)
         .map(|channel| bend(&taken, channel))
         .fold(0.0, f64::max);
     let text = format!(
-        "over {} … {} µs, at most {:.2} % off proportion",
+        "over {} … {} µs at gain ×{}, at most {:.2} % off proportion",
         first.integration_us,
         last.integration_us,
+        gain.factor(),
         100.0 * worst
     );
     Ok(if worst <= BENT {
@@ -118,10 +133,44 @@ pub(super) async fn linearity(drive: &mut Drive<Dynamixel>) -> Result<Finding> {
     })
 }
 
+/// The exposure that fills the range of the brightest colour: at the weakest gain at which the longest one does, at the
+/// strongest where none does.
+async fn filling(drive: &mut Drive<Dynamixel>) -> Result<Exposure> {
+    let settings = drive.file().photometer.clone();
+    let full = FULL * f64::from(settings.full_scale);
+    let mut exposure = Exposure {
+        integration_us: settings.integration_max_us,
+        gain: Gain::X1,
+    };
+    let mut counts = brightest(&channels(&drive.expose(exposure).await?));
+    while counts > full && exposure.integration_us / 2 >= settings.integration_min_us {
+        exposure.integration_us /= 2;
+        counts = brightest(&channels(&drive.expose(exposure).await?));
+    }
+    if exposure.integration_us == settings.integration_max_us {
+        let fills = |gain: &Gain| counts * gain.factor() >= full;
+        exposure.gain = Gain::ALL.into_iter().find(fills).unwrap_or(Gain::X256);
+    }
+    let share = full / (counts * exposure.gain.factor()).max(1.0);
+    // Above half of what was seen to fit, so not saturated.
+    exposure.integration_us = (f64::from(exposure.integration_us) * share)
+        .min(f64::from(settings.integration_max_us))
+        .max(f64::from(settings.integration_min_us)) as u32;
+    Ok(exposure)
+}
+
 /// What exposures of one length gave on average: red, green, blue, monitor.
 struct Mean {
     integration_us: u32,
     counts: [f64; 4],
+}
+
+/// Place of the lamp monitor among the channels.
+const MONITOR: usize = 3;
+
+/// Counts of the brightest colour.
+fn brightest(&[r, g, b, _]: &[f64; 4]) -> f64 {
+    r.max(g).max(b)
 }
 
 /// Red, green, blue, monitor.
