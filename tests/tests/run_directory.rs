@@ -108,6 +108,15 @@ fn quickstart_fills_a_run_directory() {
         !report["left_out"].as_array().unwrap().is_empty(),
         "what was not measured is said"
     );
+
+    let pace = |key: &str| report["pace"][key].as_f64().unwrap();
+    println!("{}", report["pace"]);
+    assert_eq!(pace("taken_s"), seconds);
+    assert_eq!(pace("in_flight"), 0.0);
+    assert!((pace("ratio") - seconds / pace("floor_s")).abs() < 1e-9);
+    // What the bus adds to the 1.15 of a rig without one, in the simulator's own time.
+    assert!((1.0..1.2).contains(&pace("ratio")), "{}", report["pace"]);
+    assert!(html.contains(&format!("the {:.1} s that motion", pace("floor_s"))));
 }
 
 #[test]

@@ -93,7 +93,12 @@ fn facts(report: &Report) -> Vec<(&'static str, String)> {
         ("State", state),
         ("Run", run.id.clone()),
         ("Began", run.started.clone()),
-        ("Rig time", format!("{:.1} s", run.seconds.total)),
+        (
+            "Rig time",
+            report
+                .pace
+                .map_or_else(|| format!("{:.1} s", run.seconds.total), |pace| pace.text()),
+        ),
         (
             "Readings",
             format!(

@@ -10,7 +10,7 @@ use sweep::{Job, LeftOut};
 
 use crate::derive::{Sweeps, truth};
 use crate::{
-    Adapted, Check, MonteCarlo, ReportError, Run, RunDirectory, checks, measurements, outline, preview,
+    Adapted, Check, MonteCarlo, Pace, ReportError, Run, RunDirectory, checks, measurements, outline, preview,
     slice, write_readings,
 };
 
@@ -37,6 +37,8 @@ pub struct Report {
     pub model: Option<String>,
     /// What the plan left out and why.
     pub left_out: Vec<LeftOut>,
+    /// How long it took beside the least that its readings take; `None` where there are none.
+    pub pace: Option<Pace>,
 }
 
 /// Makes everything in a run directory again from its journal.
@@ -96,6 +98,7 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
         no_model,
         model: model.as_ref().map(|model| model.about()),
         left_out: header.plan.left_out.clone(),
+        pace: Pace::new(&run, records, &rig),
         run,
     };
     directory.write("report.json", |file| json(file, &report))?;

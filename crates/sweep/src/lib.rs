@@ -6,6 +6,7 @@
 mod addition;
 mod error;
 mod file;
+mod floor;
 mod job;
 mod light;
 mod mechanics;
@@ -21,6 +22,7 @@ mod unread;
 pub use addition::{Addition, add};
 pub use error::SweepError;
 pub use file::{MAX_PLANES, THETA_R_DEG};
+pub use floor::floor_s;
 pub use job::{Arc, Job, Mode, Model, Plane, Until};
 pub use light::Light;
 pub use mechanics::Mechanics;

@@ -1,9 +1,10 @@
 //! How long a capture takes beside what the mechanics and the light demand.
 
+use arms::{Pose, Profile};
 use capture::{Outcome, Reading};
 use rig::RigFile;
 use rig::dynamixel::register::servo;
-use sweep::Sweep;
+use sweep::{Mechanics, Sweep};
 
 use crate::bench::{QUICKSTART, SERVOS, SHORT, Scene, assert_complete, peek};
 
@@ -12,41 +13,25 @@ use crate::bench::{QUICKSTART, SERVOS, SHORT, Scene, assert_complete, peek};
 const VELOCITY_UNIT_DEG_S: f64 = 0.229 * 360.0 / 60.0;
 const ACCELERATION_UNIT_DEG_S2: f64 = 214.577 * 360.0 / 3600.0;
 
-/// Seconds below which no capture with these readings can be: the slower arm's trapezoid between each two poses, the
-/// settling after it, the light of the readings that count, and the warm-up of the lamp. Nothing of the planner's or the
-/// drive's is used.
-fn floor_s(scene: &Scene, from_deg: [f64; 2]) -> f64 {
+/// The least that the readings of a capture take, by the profiles that the servos had in the end.
+fn floor_s(scene: &Scene, from: Pose) -> f64 {
     let profiles = SERVOS.map(|device| {
         let velocity = peek(&scene.bench, device, servo::PROFILE_VELOCITY) as f64;
         let acceleration = peek(&scene.bench, device, servo::PROFILE_ACCELERATION) as f64;
-        (
-            velocity * VELOCITY_UNIT_DEG_S,
-            acceleration * ACCELERATION_UNIT_DEG_S2,
-        )
+        Profile {
+            velocity_rad_s: (velocity * VELOCITY_UNIT_DEG_S).to_radians(),
+            acceleration_rad_s2: (acceleration * ACCELERATION_UNIT_DEG_S2).to_radians(),
+        }
     });
-    let leg_s = |way_deg: f64, (v, a): (f64, f64)| {
-        let ramps_deg = v * v / a;
-        if way_deg < ramps_deg {
-            2.0 * (way_deg / a).sqrt()
-        } else {
-            way_deg / v + v / a
-        }
+    let mechanics = Mechanics {
+        profiles,
+        ..capture::mechanics(scene.drive.file(), None)
     };
-    let file = scene.drive.file();
-    let settle_s = file.motion.settle.as_secs_f64();
-    let mut at_deg = from_deg;
-    let mut floor_s = file.photometer.lamp_warm_up.as_secs_f64();
-    for reading in scene.journal.accepted() {
-        let to_deg = [reading.goal.light.deg(), reading.goal.sensor.deg()];
-        let legs = [0, 1].map(|arm| leg_s((to_deg[arm] - at_deg[arm]).abs(), profiles[arm]));
-        let motion_s = legs[0].max(legs[1]);
-        if motion_s > 0.0 {
-            floor_s += motion_s + settle_s;
-        }
-        floor_s += f64::from(reading.counts.exposure.integration_us) * 1e-6;
-        at_deg = to_deg;
-    }
-    floor_s
+    let accepted = scene.journal.accepted();
+    let readings = accepted
+        .iter()
+        .map(|reading| (reading.goal, reading.counts.exposure.duration().as_secs_f64()));
+    sweep::floor_s(&mechanics, Some(from), readings)
 }
 
 fn of(readings: &[&Reading], sweep: Sweep) -> usize {
@@ -61,7 +46,7 @@ async fn a_full_capture_takes_hardly_longer_than_its_motion_settling_and_light()
         let before = scene.bench.now();
         assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
         let taken_s = (scene.bench.now() - before).as_secs_f64();
-        let floor_s = floor_s(&scene, [start.light.deg(), start.sensor.deg()]);
+        let floor_s = floor_s(&scene, start);
         println!(
             "{specimen}: floor {floor_s:.2} s, taken {taken_s:.2} s, {:.3} of it",
             taken_s / floor_s
