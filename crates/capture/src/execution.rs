@@ -1,30 +1,27 @@
-use std::time::{Duration, SystemTime};
+use std::time::SystemTime;
 
 use arms::Pose;
-use rig::{Counts, Drive, Exposure, Gain, Identity, Lamp, Rig, RigFile};
-use sweep::{Plan, Step, Sweep};
+use rig::{Drive, Exposure, Identity, Rig, RigFile};
+use sweep::{Plan, Step};
 use tokio::sync::watch;
 
 use crate::clock::DeviceClock;
 use crate::exposure::Ranging;
 use crate::progress::Progress;
 use crate::run::Ask;
-use crate::{CaptureError, Command, Event, Flag, Journal, Reading, Record, State, closed, mechanics};
+use crate::{CaptureError, Command, Event, Journal, Reading, Record, State, closed};
 
 mod dark;
 mod fly;
+mod repeat;
 mod shutdown;
+mod step;
 mod suspend;
+mod wait;
 
 pub(crate) use shutdown::Interrupt;
+pub(crate) use step::MAX_EXPOSURES;
 
-/// Most exposures of one reading in one execution until it counts: from one end of the range to the other takes six, by
-/// a factor of about 16 each. One more may follow for its faintest channel.
-pub(crate) const MAX_EXPOSURES: u32 = 8;
-/// Longest time between two looks at a rig that waits, and at what the operator wants.
-const LOOK: Duration = Duration::from_millis(200);
-/// Share of its nominal output below which a lamp is out.
-const OUT: f64 = 0.01;
 /// Ticks of the photometer's clock per second.
 const TICKS_PER_S: f64 = 1e5;
 
@@ -221,166 +218,6 @@ impl<'a, R: Rig> Execution<'a, R> {
         .await
     }
 
-    /// Measures a pose of the finished part again and records by how much it differs.
-    async fn repeat(&mut self) -> Result<(), Interrupt<R::Error>> {
-        let Some(before) = reference(self.journal.records()).cloned() else {
-            return Ok(());
-        };
-        self.switch_lamp(true).await?;
-        let retries = self.drive.retries();
-        // In flight a reading is not taken at its step's pose itself.
-        let taken = self.file.nearest(before.measured);
-        let there = before.swept_rad.is_some() && self.file.envelope.check_pose(taken).is_ok();
-        let measured = self.travel_anew(if there { taken } else { before.goal }).await?;
-        let counts = self.drive.expose(before.counts.exposure).await?;
-        if self.lamp_is_out(&counts) {
-            return Err(Interrupt::Lamp);
-        }
-        let mut reading = Reading {
-            accepted: false,
-            sweep: Sweep::Repeat,
-            swept_rad: None,
-            measured,
-            counts,
-            device_ticks: self.clock.unwrap(counts.ticks),
-            retries: self.drive.retries() - retries,
-            ..before.clone()
-        };
-        reading.flags = self.flags(&reading);
-        let difference_rel = difference_rel(&before.counts, &counts);
-        let repeat = Record::Repeat {
-            reading: reading.clone(),
-            difference_rel,
-        };
-        self.append(&repeat).await?;
-        self.mark = self.clock.last();
-        self.emit(Event::Repeat {
-            reading: Box::new(reading),
-            difference_rel,
-        });
-        Ok(())
-    }
-
-    /// One step: lamp, motion, exposures until one is accepted, and one more where a channel is too faint in that.
-    async fn step(&mut self, step: &Step) -> Result<(), Interrupt<R::Error>> {
-        self.emit(Event::Step {
-            step: step.index,
-            of: self.plan.steps.len(),
-            sweep: step.sweep,
-            goal: step.pose(),
-        });
-        if step.lamp != self.lamp {
-            self.switch_lamp(step.lamp).await?;
-        }
-        let mut retries = self.drive.retries();
-        let measured = self.travel(step).await?;
-        let fixed = fixed(step);
-        let mut exposure = fixed.unwrap_or_else(|| self.ranging.first(step.sweep, step.pose()));
-        let mut beside = None;
-        for left in (0..MAX_EXPOSURES).rev() {
-            let counts = self.expose(step, exposure).await?;
-            let better = match fixed {
-                None if left > 0 => self.ranging.better(&counts),
-                _ => None,
-            };
-            let accepted = better.is_none();
-            retries = self.rested(step, measured, counts, accepted, retries).await?;
-            match better {
-                Some(better) => exposure = better,
-                None => {
-                    beside = self.ranging.beside(&counts).filter(|_| fixed.is_none());
-                    break;
-                }
-            }
-        }
-        if let Some(beside) = beside {
-            let counts = self.expose(step, beside).await?;
-            self.rested(step, measured, counts, false, retries).await?;
-        }
-        Ok(())
-    }
-
-    /// Exposes, and looks at the lamp.
-    async fn expose(&mut self, step: &Step, exposure: Exposure) -> Result<Counts, Interrupt<R::Error>> {
-        let counts = self.drive.expose(exposure).await?;
-        if step.lamp {
-            self.heed_lamp(&counts)?;
-        }
-        Ok(counts)
-    }
-
-    /// A reading of a step as it is first known: it does not count yet, and nothing is said against it.
-    fn taken(&mut self, step: &Step, counts: Counts, measured: Pose) -> Reading {
-        Reading {
-            step: step.index,
-            attempt: self.attempts[step.index],
-            accepted: false,
-            sweep: step.sweep,
-            lamp: step.lamp,
-            goal: step.pose(),
-            measured,
-            counts,
-            device_ticks: self.clock.unwrap(counts.ticks),
-            retries: 0,
-            flags: Vec::new(),
-            swept_rad: None,
-        }
-    }
-
-    /// Records a reading of arms at rest, `retries` being the requests repeated before it; returns those after it.
-    async fn rested(
-        &mut self,
-        step: &Step,
-        measured: Pose,
-        counts: Counts,
-        accepted: bool,
-        retries: u32,
-    ) -> Result<u32, Interrupt<R::Error>> {
-        let now = self.drive.retries();
-        let mut reading = self.taken(step, counts, measured);
-        reading.accepted = accepted;
-        reading.retries = now - retries;
-        reading.flags = self.flags(&reading);
-        self.record(reading, step).await?;
-        Ok(now)
-    }
-
-    /// Drives to a step's pose; from wherever the arms are where its own path does not lead on.
-    async fn travel(&mut self, step: &Step) -> Result<Pose, Interrupt<R::Error>> {
-        let measured = match self.standing {
-            Some(_) => self.drive.travel(&step.path).await?.pose(),
-            None => self.travel_anew(step.pose()).await?,
-        };
-        self.standing = Some(step.pose());
-        Ok(measured)
-    }
-
-    /// Drives to a pose from wherever the arms are.
-    async fn travel_anew(&mut self, to: Pose) -> Result<Pose, Interrupt<R::Error>> {
-        let from = self.drive.snapshot().await?.pose();
-        let mechanics = mechanics(self.file, Some(from));
-        let path = sweep::way(&mechanics, from, to).map_err(Interrupt::Way)?;
-        Ok(self.drive.travel(&path).await?.pose())
-    }
-
-    /// Whether the monitor saw no light: a photometer that restarted on its own has its lamp off, and says so nowhere.
-    fn lamp_is_out(&self, counts: &Counts) -> bool {
-        let nominal = self.file.calibration.monitor * f64::from(counts.exposure.integration_us);
-        self.file.visits.lamp == Lamp::Monitor && f64::from(counts.monitor) < OUT * nominal
-    }
-
-    fn flags(&self, reading: &Reading) -> Vec<Flag> {
-        let dim = reading.lamp && self.ranging.dim(&reading.counts);
-        [
-            (reading.counts.saturated, Flag::Saturated),
-            (dim && !reading.counts.saturated, Flag::Dim),
-            (reading.retries > 0, Flag::Retried),
-        ]
-        .into_iter()
-        .filter_map(|(is, flag)| is.then_some(flag))
-        .collect()
-    }
-
     /// Makes a reading durable, then known.
     async fn record(&mut self, reading: Reading, step: &Step) -> Result<(), Interrupt<R::Error>> {
         self.append(&Record::Reading(reading.clone())).await?;
@@ -416,73 +253,6 @@ impl<'a, R: Rig> Execution<'a, R> {
         }
     }
 
-    /// Switches the lamp, and waits for steady light.
-    async fn switch_lamp(&mut self, on: bool) -> Result<(), Interrupt<R::Error>> {
-        self.drive.lamp(on).await?;
-        self.lamp = on;
-        match on {
-            true => self.warm_up(self.file.photometer.lamp_warm_up).await,
-            false => Ok(()),
-        }
-    }
-
-    /// Waits until the lamp, which is on, gives steady light.
-    async fn warm_up(&mut self, mut left: Duration) -> Result<(), Interrupt<R::Error>> {
-        self.state(State::WarmingUp);
-        while !left.is_zero() {
-            self.obey().await?;
-            let slice = left.min(self.look_every());
-            self.drive.wait(slice).await?;
-            left -= slice;
-            self.look().await?;
-        }
-        self.mark = self.look().await?;
-        self.progress.warm();
-        self.state(State::Running);
-        Ok(())
-    }
-
-    /// Does what the operator asked for since the last look; returns when the capture is to go on.
-    async fn obey(&mut self) -> Result<(), Interrupt<R::Error>> {
-        let mut paused = false;
-        loop {
-            let command = *self.control.borrow_and_update();
-            match command {
-                Command::Run => break,
-                Command::Finish => return Err(Interrupt::Finish),
-                Command::Stop => return Err(Interrupt::Stop),
-                Command::Estop => return Err(Interrupt::Estop),
-                Command::Pause => {}
-            }
-            if !paused {
-                paused = true;
-                self.state(State::Paused);
-            }
-            // The host's clock, since a simulator's runs ahead only when told to wait.
-            let _ = tokio::time::timeout(self.look_every(), self.control.changed()).await;
-            self.mark = self.look().await?;
-        }
-        if paused {
-            self.state(State::Running);
-        }
-        Ok(())
-    }
-
-    /// Time between two looks at a rig that waits: three per watchdog time, since one may be late.
-    fn look_every(&self) -> Duration {
-        match self.file.motion.watchdog {
-            Duration::ZERO => LOOK,
-            watchdog => LOOK.min(watchdog / 3),
-        }
-    }
-
-    /// Looks at every device, so that no watchdog trips, and at the photometer's clock, so that no wrap is missed.
-    async fn look(&mut self) -> Result<u64, Interrupt<R::Error>> {
-        self.drive.snapshot().await?;
-        let ticks = self.drive.ticks().await?;
-        Ok(self.clock.unwrap(ticks))
-    }
-
     fn emit(&mut self, event: Event) {
         (self.on_event)(event);
     }
@@ -501,35 +271,11 @@ impl<'a, R: Rig> Execution<'a, R> {
     }
 }
 
-/// The exposure that a step must have, where it is not ranged.
-fn fixed(step: &Step) -> Option<Exposure> {
-    step.exposure.map(|(gain, integration_us)| Exposure {
-        integration_us,
-        gain: Gain::ALL[usize::from(gain).min(Gain::ALL.len() - 1)],
-    })
-}
-
 fn readings(records: &[Record]) -> impl Iterator<Item = &Reading> {
     records.iter().filter_map(|record| match record {
         Record::Reading(reading) => Some(reading),
         _ => None,
     })
-}
-
-/// The reading that is measured again when a run goes on: the last one that is bright enough and not too bright.
-fn reference(records: &[Record]) -> Option<&Reading> {
-    let sound = |reading: &&Reading| {
-        let poor = [Flag::Saturated, Flag::Dim];
-        reading.accepted && reading.lamp && !reading.flags.iter().any(|flag| poor.contains(flag))
-    };
-    readings(records).filter(sound).last()
-}
-
-/// Relative difference of the channel that was brightest, each relative to the lamp monitor.
-fn difference_rel(before: &Counts, after: &Counts) -> f64 {
-    let brightest = (0..3).max_by_key(|&c| before.rgb[c]).unwrap_or(0);
-    let level = |counts: &Counts| f64::from(counts.rgb[brightest]) / f64::from(counts.monitor.max(1));
-    level(after) / level(before).max(f64::MIN_POSITIVE) - 1.0
 }
 
 /// The last device time in a journal.

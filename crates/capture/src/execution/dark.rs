@@ -2,7 +2,8 @@ use arms::{Arm, ArmAngle, Pose};
 use rig::Rig;
 use sweep::Step;
 
-use super::{Execution, Interrupt, fixed};
+use super::step::fixed;
+use super::{Execution, Interrupt};
 use crate::{Event, mechanics};
 
 impl<R: Rig> Execution<'_, R> {

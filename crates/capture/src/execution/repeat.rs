@@ -1,0 +1,63 @@
+use rig::{Counts, Rig};
+use sweep::Sweep;
+
+use super::{Execution, Interrupt, readings};
+use crate::{Event, Flag, Reading, Record};
+
+impl<R: Rig> Execution<'_, R> {
+    /// Measures a pose of the finished part again and records by how much it differs.
+    pub(super) async fn repeat(&mut self) -> Result<(), Interrupt<R::Error>> {
+        let Some(before) = reference(self.journal.records()).cloned() else {
+            return Ok(());
+        };
+        self.switch_lamp(true).await?;
+        let retries = self.drive.retries();
+        // In flight a reading is not taken at its step's pose itself.
+        let taken = self.file.nearest(before.measured);
+        let there = before.swept_rad.is_some() && self.file.envelope.check_pose(taken).is_ok();
+        let measured = self.travel_anew(if there { taken } else { before.goal }).await?;
+        let counts = self.drive.expose(before.counts.exposure).await?;
+        if self.lamp_is_out(&counts) {
+            return Err(Interrupt::Lamp);
+        }
+        let mut reading = Reading {
+            accepted: false,
+            sweep: Sweep::Repeat,
+            swept_rad: None,
+            measured,
+            counts,
+            device_ticks: self.clock.unwrap(counts.ticks),
+            retries: self.drive.retries() - retries,
+            ..before.clone()
+        };
+        reading.flags = self.flags(&reading);
+        let difference_rel = difference_rel(&before.counts, &counts);
+        let repeat = Record::Repeat {
+            reading: reading.clone(),
+            difference_rel,
+        };
+        self.append(&repeat).await?;
+        self.mark = self.clock.last();
+        self.emit(Event::Repeat {
+            reading: Box::new(reading),
+            difference_rel,
+        });
+        Ok(())
+    }
+}
+
+/// The reading that is measured again when a run goes on: the last one that is bright enough and not too bright.
+fn reference(records: &[Record]) -> Option<&Reading> {
+    let sound = |reading: &&Reading| {
+        let poor = [Flag::Saturated, Flag::Dim];
+        reading.accepted && reading.lamp && !reading.flags.iter().any(|flag| poor.contains(flag))
+    };
+    readings(records).filter(sound).last()
+}
+
+/// Relative difference of the channel that was brightest, each relative to the lamp monitor.
+fn difference_rel(before: &Counts, after: &Counts) -> f64 {
+    let brightest = (0..3).max_by_key(|&c| before.rgb[c]).unwrap_or(0);
+    let level = |counts: &Counts| f64::from(counts.rgb[brightest]) / f64::from(counts.monitor.max(1));
+    level(after) / level(before).max(f64::MIN_POSITIVE) - 1.0
+}
