@@ -1,0 +1,30 @@
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::JobId;
+
+/// A run.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+pub struct RunView {
+    /// Its id, never reused.
+    pub id: String,
+    /// The job that it executes.
+    pub job: JobId,
+    /// What messages call the job's file.
+    pub name: String,
+    /// What was measured, in the technician's words.
+    pub specimen: String,
+    /// Where its files are.
+    #[schema(value_type = String)]
+    pub directory: PathBuf,
+    /// When it began, RFC 3339, UTC.
+    pub started: String,
+    /// When its files were written last, RFC 3339, UTC; `None` before.
+    pub reported: Option<String>,
+    /// Steps of its plan.
+    pub planned: u64,
+    /// Steps with an accepted reading.
+    pub accepted: u64,
+}
