@@ -204,12 +204,16 @@ impl Watch {
     }
 
     /// Reads on until an event that is looked for.
+    ///
+    /// # Panics
+    /// At a fault that is not.
     pub(crate) async fn until(&mut self, wanted: impl Fn(&Value) -> bool) -> (u64, Value) {
         loop {
             let (id, event) = self.next().await.expect("the stream goes on");
             if wanted(&event) {
                 return (id, event);
             }
+            assert!(event["event"] != "fault", "{event}");
         }
     }
 }
