@@ -30,8 +30,12 @@ struct Service {
 
 impl Service {
     fn start(arguments: &[&str]) -> Self {
+        Self::with("", arguments)
+    }
+
+    fn with(rig: &str, arguments: &[&str]) -> Self {
         let directory = tempfile::tempdir().unwrap();
-        for (name, text) in [("rig.toml", ""), ("short.toml", SHORT), ("long.toml", LONG)] {
+        for (name, text) in [("rig.toml", rig), ("short.toml", SHORT), ("long.toml", LONG)] {
             fs::write(directory.path().join(name), text).unwrap();
         }
         let (child, address) = launch(directory.path(), arguments);
@@ -248,6 +252,33 @@ fn run_has_the_daemon_do_it_and_an_interrupt_leaves_a_run_to_go_on_with() {
     let accepted = whole.readings().filter(|reading| reading.accepted).count();
     assert_eq!(summary["readings"]["planned"], accepted);
     assert!(directory.join("brdf.binary").exists());
+    watcher.child.kill().unwrap();
+    watcher.child.wait().unwrap();
+}
+
+#[test]
+fn a_second_interrupt_of_a_run_that_the_daemon_does_is_an_emergency_stop() {
+    // In real time and with a long dwell, so that the second signal comes before the reading in hand is finished.
+    let slow = "motion.settle_ms = 5000\nsim.clock = \"real\"\n";
+    let service = Service::with(slow, &["--listen", "127.0.0.1:0"]);
+    let mut watcher = Watcher::of_all(&service);
+    let mut running = service
+        .command(&["run", "long.toml"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    watcher.until("a step", |event| event["event"] == "step");
+    let id = Pid::from_raw(running.id().try_into().unwrap()).unwrap();
+    kill_process(id, Signal::INT).unwrap();
+    let mut said = BufReader::new(running.stderr.take().unwrap());
+    until(&mut said, "again for an emergency stop");
+    kill_process(id, Signal::INT).unwrap();
+    until(&mut said, "emergency stop");
+    std::io::copy(&mut said, &mut std::io::sink()).unwrap();
+    let _ = Finished::from(running.wait_with_output().unwrap()).expect(3);
+    let refused = service.gonioctl(&["park"]).expect(5);
+    assert!(refused.stderr.contains("emergency stop"), "{}", refused.stderr);
     watcher.child.kill().unwrap();
     watcher.child.wait().unwrap();
 }
