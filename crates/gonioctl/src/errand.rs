@@ -2,8 +2,8 @@ use std::path::Path;
 use std::process;
 use std::sync::Arc;
 
-use capture::{FileJournal, Record};
-use goniod::{Job, JobId, JobState, Order, RunView, Status};
+use capture::{Command, FileJournal, Record};
+use goniod::{Job, JobId, JobState, RunView, Status};
 use rig::RigFile;
 use serde_json::Value;
 use ureq::http::StatusCode;
@@ -11,7 +11,7 @@ use ureq::http::StatusCode;
 use crate::cli::DaemonArguments;
 use crate::closing::Closing;
 use crate::daemon::{ClientError, Daemon};
-use crate::signals::Signals;
+use crate::signals::{STEPS, Signals};
 use crate::{print, queue, watch};
 
 /// A job that a daemon carries out while its client waits.
@@ -37,16 +37,16 @@ impl Errand {
             text => text?,
         };
         if arguments.daemon.is_none() || rig.is_some() {
-            let order = Order::read(job, rig)?;
-            if RigFile::parse(&text, "the daemon's rig file".as_ref()).ok() != Some(order.rig) {
+            let (here, name) = goniod::rig_text(rig)?;
+            let here = RigFile::parse(&here, &name)?;
+            if RigFile::parse(&text, "the daemon's rig file".as_ref()).ok() != Some(here) {
+                let name = name.display();
                 anyhow::ensure!(
                     arguments.daemon.is_none(),
-                    "--rig: the daemon drives another rig than {}",
-                    order.rig_name
+                    "--rig: the daemon drives another rig than {name}"
                 );
                 print::say(format_args!(
-                    "the daemon drives another rig than {}; it is not asked",
-                    order.rig_name
+                    "the daemon drives another rig than {name}; it is not asked"
                 ));
                 return Ok(None);
             }
@@ -159,15 +159,12 @@ fn start(daemon: &Daemon, id: JobId) -> Result<(), ClientError> {
 }
 
 async fn obey(mut signals: Signals, daemon: Arc<Daemon>) {
-    let steps = [
-        (
-            "/finish",
-            "stopping after this reading; again for an emergency stop",
-        ),
-        ("/estop", "emergency stop"),
-    ];
-    for (path, word) in steps {
+    for (command, word) in STEPS {
         signals.next().await;
+        let path = match command {
+            Command::Estop => "/estop",
+            _ => "/finish",
+        };
         print::say(word);
         let daemon = daemon.clone();
         // Not waited for: the emergency stop must not wait for an answer to what was asked before.

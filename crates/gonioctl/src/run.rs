@@ -10,7 +10,7 @@ use crate::cli::DaemonArguments;
 use crate::closing::Closing;
 use crate::errand::Errand;
 use crate::progress::Progress;
-use crate::signals::Signals;
+use crate::signals::{STEPS, Signals};
 use crate::{exit, print};
 
 /// Where run directories are made unless told otherwise.
@@ -70,16 +70,9 @@ fn alone(task: &Task<'_>) -> anyhow::Result<Closing> {
     Ok(Closing::of(&ended)?)
 }
 
-/// The first signal finishes the reading and holds, the second stops at once.
+/// Hands what signals ask for to the capture.
 pub(crate) async fn obey(mut signals: Signals, sender: watch::Sender<Command>) {
-    let words = [
-        (
-            Command::Finish,
-            "stopping after this reading; again for an emergency stop",
-        ),
-        (Command::Estop, "emergency stop"),
-    ];
-    for (command, word) in words {
+    for (command, word) in STEPS {
         signals.next().await;
         // Nobody listens any more once the capture has ended.
         match sender.send(command) {

@@ -1,4 +1,14 @@
+use capture::Command;
 use tokio::signal::unix::{Signal, SignalKind, signal};
+
+/// What each signal in turn asks of a capture, and how that is told: to finish the reading and hold, then to stop at once.
+pub(crate) const STEPS: [(Command, &str); 2] = [
+    (
+        Command::Finish,
+        "stopping after this reading; again for an emergency stop",
+    ),
+    (Command::Estop, "emergency stop"),
+];
 
 /// What asks for an end: Ctrl-C, `kill`, and a terminal that was closed.
 pub(crate) struct Signals {
