@@ -33,6 +33,7 @@ pub use error::{ReportError, is_full};
 pub use measurement::{Measurement, measurements, observations};
 pub use monte_carlo::MonteCarlo;
 pub use pace::Pace;
+pub use page::escape;
 pub use picture::Picture;
 pub use preview::{EXPOSURE as SPHERE_EXPOSURE, sphere};
 pub use readings::write_readings;

@@ -113,7 +113,7 @@ fn push(out: &mut String, line: std::fmt::Arguments<'_>) {
 }
 
 /// Text as it may stand in HTML, in attributes too.
-pub(crate) fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
