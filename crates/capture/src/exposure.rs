@@ -16,9 +16,12 @@ const STEEPEST: f64 = 8.0;
 const ALMOST_FULL: f64 = 0.95;
 /// An exposure that differs less than this from the last one is not worth another reading.
 const WORTH_IT: f64 = 1.1;
-/// A channel is exposed again beside a brighter one only where that leaves at most this share of its noise: the same
-/// exposure once more, for the same time or less, would leave 0.7 of every channel's.
+/// A channel is exposed again beside a brighter one, and a faint reading in flight again at rest, only where that leaves at
+/// most this share of its noise: the same exposure once more, for the same time or less, would leave 0.7 of every channel's.
 const QUIETER: f64 = 0.5;
+/// Times the noise that the rig file allows in flight, beyond which a reading is taken again at rest if that helps: the
+/// way there costs as much as dozens of readings in flight.
+const FAINT: f64 = 4.0;
 
 /// Chooses exposures from the readings before.
 ///
@@ -55,6 +58,11 @@ impl<'a> Ranging<'a> {
             self.dark
                 .push((exposure.gain, f64::from(exposure.integration_us), brightest));
         }
+    }
+
+    /// Whether there is a reading of a sweep to range its others from.
+    pub(crate) fn knows(&self, sweep: Sweep) -> bool {
+        self.lit.iter().any(|(of, ..)| *of == sweep)
     }
 
     /// Exposure for the first reading at a pose.
@@ -95,15 +103,27 @@ impl<'a> Ranging<'a> {
         // Below one count only the noise is known.
         let rate = faintest.max(1.0) / sensitivity(counts.exposure);
         let next = self.aim(rate);
-        let noise = |exposure: Exposure| {
-            let counts = rate * sensitivity(exposure);
-            self.file
-                .uncertainty
-                .variance(counts, exposure.gain.factor())
-                .sqrt()
-                / counts
-        };
-        (noise(next) <= QUIETER * noise(counts.exposure)).then_some(next)
+        self.quieter(rate, next, counts.exposure).then_some(next)
+    }
+
+    /// Whether a reading in flight is too faint to count, as one is that came after a much brighter one: its noise is far
+    /// from what the rig file asks for, and at rest there would be time for much less.
+    pub(crate) fn too_faint(&self, counts: &Counts) -> bool {
+        let rate = self.rate(counts);
+        let noisy = self.noise(rate, counts.exposure) > FAINT * self.photometer.flight_noise_rel;
+        noisy && !counts.saturated && self.quieter(rate, self.aim(rate), counts.exposure)
+    }
+
+    /// Whether an exposure leaves much less noise at a rate than another.
+    fn quieter(&self, rate: f64, next: Exposure, than: Exposure) -> bool {
+        self.noise(rate, next) <= QUIETER * self.noise(rate, than)
+    }
+
+    /// Standard deviation of a channel with this rate, relative to it.
+    fn noise(&self, rate: f64, exposure: Exposure) -> f64 {
+        let counts = rate * sensitivity(exposure);
+        let variance = self.file.uncertainty.variance(counts, exposure.gain.factor());
+        variance.sqrt() / counts
     }
 
     /// Whether the brightest channel has fewer counts above dark than the rig file calls enough.
@@ -403,6 +423,28 @@ mod tests {
              let gap = !Gain::ALL.into_iter().any(|gain| times.contains(&(aim / (10_f64.powf(log_rate) * gain.factor()))));
              prop_assert!(most || reached || gap, "{last:?} is dim and could be had better");
             }
+        }
+    }
+
+    #[test]
+    fn too_faint_in_flight_is_what_was_exposed_for_a_brighter_one() {
+        let file = rig("");
+        let mut ranging = Ranging::new(&file);
+        for gain in Gain::ALL {
+            let integration_us = 1000;
+            ranging.learn(&reading(
+                &file,
+                false,
+                0.0,
+                0.0,
+                Exposure { integration_us, gain },
+            ));
+        }
+        for rate in [1e-4, 0.01, 1.0] {
+            let chosen = counts(&file, rate, brief(&file, rate, 1.0));
+            assert!(!ranging.too_faint(&chosen), "{rate}: chosen for it, {chosen:?}");
+            let brighter = counts(&file, rate, brief(&file, 1e4 * rate.max(0.01), 1.0));
+            assert!(ranging.too_faint(&brighter), "{rate}: {brighter:?}");
         }
     }
 }

@@ -128,17 +128,25 @@ fn lay(
     Ok(plan)
 }
 
-/// Whether a sweep can be flown; where not, what it leaves out says so.
+/// Whether a sweep can be flown. What it leaves out says where not, and else what flying costs.
 fn may_fly(mechanics: &Mechanics, sweep: &mut Targets) -> bool {
     let may = pass(mechanics, &sweep.poses).is_some();
-    if !may {
-        sweep.left_out.push(LeftOut {
-            what: format!("{}, in flight", sweep.sweep),
-            why: "its arms would not move alike, or not freely: they stop for each reading".to_owned(),
-            readings: 0,
-            seconds: 0.0,
-        });
-    }
+    let (what, why) = match may {
+        true => (
+            "a second exposure for faint colours",
+            "in flight each reading has one, for its brightest colour",
+        ),
+        false => (
+            "in flight",
+            "its arms would not move alike, or not freely: they stop for each reading",
+        ),
+    };
+    sweep.left_out.push(LeftOut {
+        what: format!("{}, {what}", sweep.sweep),
+        why: why.to_owned(),
+        readings: 0,
+        seconds: 0.0,
+    });
     may
 }
 

@@ -26,7 +26,8 @@ const IDLE_S: f64 = 0.002;
 
 impl<R: Rig> Execution<'_, R> {
     /// Flies the pass to which a step belongs, again where it was held. Its readings count once it has landed;
-    /// those that are saturated, blurred or missing are left to be taken at rest.
+    /// those that are saturated, too faint, blurred or missing are left to be taken at rest. So is the first of a sweep,
+    /// before it: the arms stand there, and how bright it is nothing else tells.
     pub(super) async fn pass(&mut self, pass: usize) -> Result<(), Interrupt<R::Error>> {
         loop {
             self.obey().await?;
@@ -35,6 +36,10 @@ impl<R: Rig> Execution<'_, R> {
             let steps: Vec<Step> = self.plan.steps.iter().filter(undone).cloned().collect();
             let landed = match steps.first().map(|step| step.lamp) {
                 None => true,
+                Some(true) if !self.ranging.knows(steps[0].sweep) => {
+                    self.step(&steps[0]).await?;
+                    false
+                }
                 Some(true) => self.fly(&steps).await?,
                 Some(false) => self.dark_on_the_way(&steps).await?,
             };
@@ -236,7 +241,7 @@ impl<R: Rig> Execution<'_, R> {
     }
 
     /// Works out where each reading was taken and records it: as one that counts where the flight landed and it is neither
-    /// saturated nor blurred.
+    /// saturated, nor too faint, nor blurred.
     async fn land(&mut self, flight: &Flight<'_>, landed: bool) -> Result<(), Interrupt<R::Error>> {
         let mut readings = std::mem::take(&mut self.aloft);
         for reading in &mut readings {
@@ -263,7 +268,8 @@ impl<R: Rig> Execution<'_, R> {
             if blurred {
                 reading.flags.push(Flag::Blurred);
             }
-            reading.accepted = landed && !blurred && !reading.counts.saturated;
+            let faint = self.ranging.too_faint(&reading.counts);
+            reading.accepted = landed && !blurred && !reading.counts.saturated && !faint;
             let step = self.plan.steps[reading.step].clone();
             self.emit(Event::Step {
                 step: step.index,

@@ -6,6 +6,7 @@ use capture::{Command, Event, Flag, Outcome, Reading};
 use firmware_sim::{Disturbance, Fault};
 use rig::dynamixel::register;
 use rig::{Device, RigFile};
+use sweep::Sweep;
 
 use crate::bench::{QUICKSTART, SERVOS, Scene, peek};
 
@@ -226,14 +227,35 @@ async fn what_saturates_in_flight_is_taken_again_at_rest() {
     let mut scene = Scene::new(SHORT, "specimen = \"mirror:0.9\"").await;
     assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
     assert_each_once(&scene);
-    assert!(scene.journal.accepted().iter().all(|r| !r.counts.saturated));
-    let again = scene
-        .journal
-        .accepted()
-        .iter()
-        .filter(|r| r.lamp && r.swept_rad.is_none())
-        .count();
-    println!("{again} at rest");
+    let accepted = scene.journal.accepted();
+    assert!(accepted.iter().all(|r| !r.counts.saturated));
+    let readings = scene.journal.readings();
+    let full = |r: &&&Reading| r.swept_rad.is_some() && r.counts.saturated;
+    let full: Vec<_> = readings.iter().filter(full).collect();
+    assert!(!full.is_empty(), "nothing saturated in flight");
+    for reading in full {
+        let counts = accepted.iter().find(|r| r.step == reading.step);
+        assert!(counts.is_some_and(|r| r.swept_rad.is_none()), "{reading:?}");
+    }
+}
+
+/// Chrome is some ten thousand times as bright where its arc begins as where its plane does.
+#[tokio::test(start_paused = true)]
+async fn the_first_of_each_sweep_is_ranged_at_rest() {
+    let mut scene = Scene::new(SHORT, "specimen = \"chrome\"").await;
+    assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+    let accepted = scene.journal.accepted();
+    for sweep in [Sweep::Plane(0), Sweep::Arc] {
+        let first = accepted
+            .iter()
+            .find(|r| r.sweep == sweep)
+            .expect("it was measured");
+        assert_eq!(first.swept_rad, None, "{sweep} begins in flight");
+        assert!(first.flags.is_empty(), "{sweep} begins with {:?}", first.flags);
+    }
+    let refused = |r: &&&Reading| !r.accepted && r.swept_rad.is_some();
+    let refused = scene.journal.readings().iter().filter(refused).count();
+    assert_eq!(refused, 0, "readings in flight that do not count");
 }
 
 /// Watchdogs that trip after 100 ms hear enough of a flight.
