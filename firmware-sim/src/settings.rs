@@ -145,94 +145,45 @@ fn imperfections(raw: &Raw) -> Result<Imperfections, SimError> {
     };
     let amount = |key, value, base, max| within(key, value, base, 0.0..=max);
     let signed = |key, value, base, max: f64| within(key, value, base, -max..=max);
+    /// The key of this name as the field of this name.
+    macro_rules! read {
+        ($how:ident $key:ident to $max:literal) => {
+            $how(stringify!($key), raw.$key, base.$key, $max)?
+        };
+    }
     Ok(Imperfections {
-        shot_noise_electrons: amount(
-            "shot_noise_electrons",
-            raw.shot_noise_electrons,
-            base.shot_noise_electrons,
-            1e6,
-        )?,
-        read_noise_counts: amount(
-            "read_noise_counts",
-            raw.read_noise_counts,
-            base.read_noise_counts,
-            1e4,
-        )?,
-        dark_counts_per_s: amount(
-            "dark_counts_per_s",
-            raw.dark_counts_per_s,
-            base.dark_counts_per_s,
-            1e6,
-        )?,
-        dark_doubling_c: amount(
-            "dark_doubling_c",
-            raw.dark_doubling_c,
-            base.dark_doubling_c,
-            100.0,
-        )?,
-        dark_offset_counts: amount(
-            "dark_offset_counts",
-            raw.dark_offset_counts,
-            base.dark_offset_counts,
-            1e5,
-        )?,
-        self_heating_c: amount("self_heating_c", raw.self_heating_c, base.self_heating_c, 50.0)?,
-        stray_per_sr: amount("stray_per_sr", raw.stray_per_sr, base.stray_per_sr, 1.0)?,
+        shot_noise_electrons: read!(amount shot_noise_electrons to 1e6),
+        read_noise_counts: read!(amount read_noise_counts to 1e4),
+        dark_counts_per_s: read!(amount dark_counts_per_s to 1e6),
+        dark_doubling_c: read!(amount dark_doubling_c to 100.0),
+        dark_offset_counts: read!(amount dark_offset_counts to 1e5),
+        self_heating_c: read!(amount self_heating_c to 50.0),
+        stray_per_sr: read!(amount stray_per_sr to 1.0),
         lamp_warm_up: ms(
             "lamp_warm_up_ms",
             raw.lamp_warm_up_ms,
             base.lamp_warm_up.as_secs_f64() * 1e3,
             60_000.0,
         )?,
-        lamp_drift: amount("lamp_drift", raw.lamp_drift, base.lamp_drift, 0.5)?,
-        lamp_flicker: amount("lamp_flicker", raw.lamp_flicker, base.lamp_flicker, 0.5)?,
-        source_aperture_deg: amount(
-            "source_aperture_deg",
-            raw.source_aperture_deg,
-            base.source_aperture_deg,
-            10.0,
-        )?,
-        detector_aperture_deg: amount(
-            "detector_aperture_deg",
-            raw.detector_aperture_deg,
-            base.detector_aperture_deg,
-            10.0,
-        )?,
-        light_backlash_deg: amount(
-            "light_backlash_deg",
-            raw.light_backlash_deg,
-            base.light_backlash_deg,
-            5.0,
-        )?,
-        sensor_backlash_deg: amount(
-            "sensor_backlash_deg",
-            raw.sensor_backlash_deg,
-            base.sensor_backlash_deg,
-            5.0,
-        )?,
+        lamp_drift: read!(amount lamp_drift to 0.5),
+        lamp_flicker: read!(amount lamp_flicker to 0.5),
+        source_aperture_deg: read!(amount source_aperture_deg to 10.0),
+        detector_aperture_deg: read!(amount detector_aperture_deg to 10.0),
+        light_backlash_deg: read!(amount light_backlash_deg to 5.0),
+        sensor_backlash_deg: read!(amount sensor_backlash_deg to 5.0),
         following_lag: ms(
             "following_lag_ms",
             raw.following_lag_ms,
             base.following_lag.as_secs_f64() * 1e3,
             500.0,
         )?,
-        responsivity_error: signed(
-            "responsivity_error",
-            raw.responsivity_error,
-            base.responsivity_error,
-            0.5,
-        )?,
-        gain_error: signed("gain_error", raw.gain_error, base.gain_error, 0.5)?,
-        nonlinearity: amount("nonlinearity", raw.nonlinearity, base.nonlinearity, 0.1)?,
-        crosstalk: amount("crosstalk", raw.crosstalk, base.crosstalk, 0.5)?,
-        lamp_trend_per_h: signed(
-            "lamp_trend_per_h",
-            raw.lamp_trend_per_h,
-            base.lamp_trend_per_h,
-            0.5,
-        )?,
-        light_zero_deg: signed("light_zero_deg", raw.light_zero_deg, base.light_zero_deg, 5.0)?,
-        sensor_zero_deg: signed("sensor_zero_deg", raw.sensor_zero_deg, base.sensor_zero_deg, 5.0)?,
+        responsivity_error: read!(signed responsivity_error to 0.5),
+        gain_error: read!(signed gain_error to 0.5),
+        nonlinearity: read!(amount nonlinearity to 0.1),
+        crosstalk: read!(amount crosstalk to 0.5),
+        lamp_trend_per_h: read!(signed lamp_trend_per_h to 0.5),
+        light_zero_deg: read!(signed light_zero_deg to 5.0),
+        sensor_zero_deg: read!(signed sensor_zero_deg to 5.0),
     })
 }
 
