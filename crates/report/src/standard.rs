@@ -196,76 +196,48 @@ impl Standard {
     ) -> Result<Certificate, ReportError> {
         let readings = all_taken(records);
         let taken: Vec<Taken> = readings.iter().map(|(_, taken)| *taken).collect();
-        let of = |sweep: Sweep| -> Vec<Taken> {
+        let of = |sweep: Sweep, at: &dyn Fn(Pose) -> bool| -> Vec<Taken> {
             let of = readings
                 .iter()
-                .filter(|(reading, _)| reading.accepted && reading.sweep == sweep);
+                .filter(|(reading, _)| reading.accepted && reading.sweep == sweep && at(reading.goal));
             of.map(|(_, taken)| *taken).collect()
         };
         let failed = ReportError::Calibration;
-        let visits = of(Sweep::Reference);
+        let conditions = |of| self.conditions(records, of);
         let mut certificate = before.clone();
-        let header = records.iter().find_map(|record| match record {
-            Record::Header(header) => Some((header.started.clone(), header.run.clone())),
-            _ => None,
-        });
-        let (made, run) = header.unwrap_or_default();
-        let conditions = |of: Conditions| Conditions {
-            made: made.clone(),
-            run: run.clone(),
-            standard: self.name().to_owned(),
-            ..of
-        };
         match self {
             Self::White(reference) => {
                 let at = |certified: &Certified| {
                     let goal = file.nearest(certified.pose);
-                    let here = readings.iter().filter(|(reading, _)| {
-                        reading.accepted && reading.sweep == Sweep::Reference && reading.goal == goal
-                    });
-                    (*certified, here.map(|(_, taken)| *taken).collect())
+                    (*certified, of(Sweep::Reference, &|pose| pose == goal))
                 };
                 let certified: Vec<(Certified, Vec<Taken>)> = reference.certified.iter().map(at).collect();
-                let ladder = of(Sweep::Repeat);
+                let ladder = of(Sweep::Repeat, &|_| true);
                 let mut white =
                     White::measure(file, &taken, &ladder, &certified, reference.u, before).map_err(failed)?;
                 white.conditions = conditions(white.conditions);
                 certificate.white = Some(white);
             }
             Self::Trap => {
+                let visits = of(Sweep::Reference, &|_| true);
                 let mut trap = Trap::measure(file, &taken, &visits, before).map_err(failed)?;
                 trap.conditions = conditions(trap.conditions);
                 certificate.trap = Some(trap);
             }
             Self::Mirror => {
-                let scans: Vec<Vec<Taken>> = MIRROR_DEG
-                    .iter()
-                    .map(|&deg| {
-                        let sensor = file.nearest(Pose::from_deg(-deg, deg)).sensor;
-                        let within = readings.iter().filter(|(reading, _)| {
-                            reading.accepted
-                                && reading.sweep == Sweep::Reference
-                                && reading.goal.sensor == sensor
-                        });
-                        within.map(|(_, taken)| *taken).collect()
-                    })
-                    .collect();
+                let scans = MIRROR_DEG.map(|deg| {
+                    let sensor = file.nearest(Pose::from_deg(-deg, deg)).sensor;
+                    of(Sweep::Reference, &|pose| pose.sensor == sensor)
+                });
                 let mut zero = Zero::measure(file, &taken, &scans).map_err(failed)?;
                 zero.conditions = conditions(zero.conditions);
                 certificate.zero = Some(zero);
             }
             Self::Patch { name, rgb } => {
-                let seen: Vec<[f64; 3]> = measurements(records, file)
-                    .iter()
-                    .filter(|m| m.reading.accepted && m.reading.sweep == Sweep::Reference)
-                    .filter_map(|m| Some(m.raw?.to_array()))
-                    .collect();
-                let n = seen.len() as f64;
-                let mean = |c: usize| seen.iter().map(|f| f[c]).sum::<f64>() / n * std::f64::consts::PI;
                 certificate.patches.retain(|patch| patch.name != *name);
                 certificate.patches.push(Patch {
                     name: name.clone(),
-                    sensor: [mean(0), mean(1), mean(2)],
+                    sensor: reflectance_factor(file, records),
                     rgb: *rgb,
                 });
                 // Too few patches yet are no fault.
@@ -277,6 +249,32 @@ impl Standard {
         }
         Ok(certificate)
     }
+
+    /// What a certificate was made under, with when, in which run and on what.
+    fn conditions(&self, records: &[Record], of: Conditions) -> Conditions {
+        let header = records.iter().find_map(|record| match record {
+            Record::Header(header) => Some((header.started.clone(), header.run.clone())),
+            _ => None,
+        });
+        let (made, run) = header.unwrap_or_default();
+        Conditions {
+            made,
+            run,
+            standard: self.name().to_owned(),
+            ..of
+        }
+    }
+}
+
+/// Mean reflectance factor of what lies on the stage, in the sensor's own colours.
+fn reflectance_factor(file: &RigFile, records: &[Record]) -> [f64; 3] {
+    let seen: Vec<[f64; 3]> = measurements(records, file)
+        .iter()
+        .filter(|m| m.reading.accepted && m.reading.sweep == Sweep::Reference)
+        .filter_map(|m| Some(m.raw?.to_array()))
+        .collect();
+    let sum = |c: usize| seen.iter().map(|f| f[c]).sum::<f64>();
+    [0, 1, 2].map(|c| sum(c) / seen.len() as f64 * std::f64::consts::PI)
 }
 
 /// Overlapping exposures of every gain at a certified geometry, by the rig file's responsivity.
