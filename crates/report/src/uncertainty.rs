@@ -47,7 +47,7 @@ pub(crate) fn sensitivities(measurements: &[Measurement], rig: &RigFile) -> Vec<
         for (place, &(ref visit, (_, f))) in members.iter().enumerate() {
             let m = &measurements[visit[0]];
             let [slope, bend] = derivatives(&points, place);
-            let (along, blur) = match sweep {
+            let (slopes, blur) = match sweep {
                 Sweep::Plane(_) => {
                     let blur = blur(slope, bend, m, rig);
                     if m.deviation.abs() < nearest {
@@ -55,17 +55,20 @@ pub(crate) fn sensitivities(measurements: &[Measurement], rig: &RigFile) -> Vec<
                         peak =
                             blur / f.max(DVec3::splat(f64::MIN_POSITIVE)) / bends(m.pose.light.rad().cos());
                     }
-                    (slope, blur)
+                    // The deviation is sin α_light + sin α_sensor; near grazing the light hardly changes it.
+                    let ratio = m.pose.sensor.rad().cos() / m.pose.light.rad().cos().max(1e-3);
+                    ([slope, slope * ratio], blur)
                 }
-                // Along the arc the lobe's width does not show; about the half vector it is that of the planes.
+                // Along the arc the lobe's width does not show; about the half vector it is that of the planes. Its slope is
+                // that over the angle between the arms, of which each has a half; the top of the lobe has none.
                 _ => {
                     let blur = (peak * bends(m.pose.light.rad().cos())).clamp(-DVec3::ONE, DVec3::ONE);
-                    (DVec3::ZERO, blur * f)
+                    ([slope / 2.0, slope / -2.0], blur * f)
                 }
             };
             for &i in visit {
                 found[i] = Sensitivity {
-                    arms: arms(along, f, m, rig),
+                    arms: arms(slopes, f, m, rig),
                     aperture: blur,
                 };
             }
@@ -100,7 +103,7 @@ fn blur(slope: DVec3, bend: DVec3, m: &Measurement, rig: &RigFile) -> DVec3 {
     let cosine = m.pose.light.rad().cos().max(1e-3);
     let across = match m.deviation.abs() {
         // The limit of what follows.
-        deviation if deviation < source + detector => bend / (cosine * cosine),
+        deviation if deviation <= source + detector => bend / (cosine * cosine),
         _ => slope / (cosine * m.pose.deviation()),
     };
     (source * source + detector * detector) / 8.0 * (bend + across)
@@ -112,12 +115,11 @@ fn bends(cosine: f64) -> f64 {
     1.0 + 1.0 / (cosine * cosine).max(1e-6)
 }
 
-/// The reflectance is divided by the cosine of the angle that was read, and taken to stand at that angle.
-fn arms(slope: DVec3, f: DVec3, m: &Measurement, rig: &RigFile) -> [DVec3; 2] {
+/// The reflectance is divided by the cosine of the angle that was read, and taken to stand at that angle, from which it
+/// changes by these slopes for the light and the sensor arm.
+fn arms(slopes: [DVec3; 2], f: DVec3, m: &Measurement, rig: &RigFile) -> [DVec3; 2] {
     let [light, sensor] = [m.pose.light.rad(), m.pose.sensor.rad()];
-    // The deviation is sin α_light + sin α_sensor; near grazing the light hardly changes it.
-    let ratio = sensor.cos() / light.cos().max(1e-3);
-    let mut arms = [slope, slope * ratio];
+    let mut arms = slopes;
     match rig.calibration.filling {
         Filling::Over => arms[Arm::Light as usize] -= f * light.tan(),
         Filling::Under => arms[Arm::Sensor as usize] -= f * sensor.tan(),
