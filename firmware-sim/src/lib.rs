@@ -13,6 +13,7 @@ mod imperfections;
 pub mod in_process;
 mod lamp;
 mod mishaps;
+mod node;
 mod optics;
 mod orders;
 mod photodiodes;

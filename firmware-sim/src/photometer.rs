@@ -8,15 +8,11 @@ use std::time::Duration;
 use registers as reg;
 
 use crate::Device;
-use crate::fault::{Disturbance, Schedule};
+use crate::fault::Disturbance;
 use crate::lamp::Lamp;
+use crate::node::Node;
 use crate::photodiodes::Exposed;
 use crate::table::Table;
-
-/// Unit of Bus Watchdog.
-const WATCHDOG_UNIT: Duration = Duration::from_millis(20);
-/// Value of Bus Watchdog once it has tripped.
-const TRIPPED: i64 = 0xFF;
 
 /// Values of Status.
 const INTEGRATING: i64 = 1;
@@ -48,14 +44,10 @@ pub(crate) struct Integration {
 #[derive(Debug)]
 pub(crate) struct Photometer {
     fitting: Fitting,
-    table: Table,
+    node: Node,
     lamp: Lamp,
-    now: Duration,
     /// When its clock read 0.
     booted: Duration,
-    heard: Duration,
-    deaf_until: Duration,
-    silent_until: Duration,
     glare_until: Duration,
     door_until: Duration,
     integration: Option<Integration>,
@@ -63,23 +55,16 @@ pub(crate) struct Photometer {
     delay: Option<Duration>,
     refuses_trigger: bool,
     loses_acknowledgement: bool,
-    faults: Schedule,
 }
 
 impl Photometer {
     pub(crate) fn new(fitting: Fitting, lamp: Lamp) -> Self {
-        let mut table = Table::new(reg::REGISTERS.to_vec());
-        table.set(reg::ID, i64::from(fitting.id));
-        table.set(reg::BAUD, i64::from(fitting.baud_code));
+        let table = Table::new(reg::REGISTERS.to_vec());
         Self {
+            node: Node::new(table, fitting.id, fitting.baud_code),
             fitting,
-            table,
             lamp,
-            now: Duration::ZERO,
             booted: Duration::ZERO,
-            heard: Duration::ZERO,
-            deaf_until: Duration::ZERO,
-            silent_until: Duration::ZERO,
             glare_until: Duration::ZERO,
             door_until: Duration::ZERO,
             integration: None,
@@ -87,7 +72,6 @@ impl Photometer {
             delay: None,
             refuses_trigger: false,
             loses_acknowledgement: false,
-            faults: Schedule::default(),
         }
     }
 
@@ -105,7 +89,7 @@ impl Photometer {
     }
 
     pub(crate) fn set_wire_clock(&mut self, wire: bool) {
-        self.table.set(reg::CLOCK, i64::from(wire));
+        self.node.table.set(reg::CLOCK, i64::from(wire));
     }
 
     pub(crate) fn take_delay(&mut self) -> Option<Duration> {
@@ -117,59 +101,52 @@ impl Photometer {
     }
 
     pub(crate) fn schedule(&mut self, at: Duration, what: Disturbance) {
-        self.faults.push(at, what);
+        self.node.faults.push(at, what);
     }
 
     /// When something happens by itself next.
     pub(crate) fn next_event(&self) -> Option<Duration> {
-        [
-            self.deaf_until,
-            self.silent_until,
-            self.glare_until,
-            self.door_until,
-        ]
-        .map(Some)
-        .into_iter()
-        .chain([
-            self.watchdog(),
-            self.faults.next(),
-            self.integration.map(|running| running.end),
-        ])
-        .flatten()
-        .filter(|&at| at > self.now)
-        .min()
+        let [deaf, silent] = self.node.wakes();
+        [deaf, silent, self.glare_until, self.door_until]
+            .map(Some)
+            .into_iter()
+            .chain([
+                self.watchdog(),
+                self.node.faults.next(),
+                self.integration.map(|running| running.end),
+            ])
+            .flatten()
+            .filter(|&at| at > self.node.now)
+            .min()
     }
 
     fn watchdog(&self) -> Option<Duration> {
-        let units = self.table.get(reg::BUS_WATCHDOG);
-        let armed = self.lamp.on() && units != 0 && units != TRIPPED;
-        armed.then(|| self.heard + WATCHDOG_UNIT * u32::try_from(units).expect("at most 127"))
+        self.node.watchdog(self.lamp.on())
     }
 
     /// Lets time pass. The bench completes an integration that ends meanwhile, before it asks for more.
     pub(crate) fn advance_to(&mut self, t: Duration) {
-        while let Some(at) = [self.watchdog(), self.faults.next()]
+        while let Some(at) = [self.watchdog(), self.node.faults.next()]
             .into_iter()
             .flatten()
             .min()
             .filter(|&at| at <= t)
         {
-            self.now = self.now.max(at);
+            self.node.now = self.node.now.max(at);
             if self.watchdog() == Some(at) {
                 self.trip();
-            } else if let Some(what) = self.faults.pop(at) {
+            } else if let Some(what) = self.node.faults.pop(at) {
                 self.suffer(what);
             }
         }
-        self.now = self.now.max(t);
+        self.node.now = self.node.now.max(t);
     }
 
     fn suffer(&mut self, what: Disturbance) {
         match what {
-            Disturbance::Silence(duration) => self.silent_until = self.now + duration,
+            Disturbance::Silence(duration) => self.node.silence(duration),
             Disturbance::HardwareError(bits) => {
-                let bits = self.table.get(reg::HARDWARE_ERROR) | i64::from(bits);
-                self.table.set(reg::HARDWARE_ERROR, bits);
+                self.node.fail(bits);
                 self.switch_lamp(false);
             }
             Disturbance::RefusedTrigger => self.refuses_trigger = true,
@@ -181,9 +158,9 @@ impl Photometer {
                     integration.end += duration;
                 }
             }
-            Disturbance::Door(duration) => self.door_until = self.now + duration,
-            Disturbance::Glare(duration) => self.glare_until = self.now + duration,
-            Disturbance::Id(id) => self.table.set(reg::ID, id.into()),
+            Disturbance::Door(duration) => self.door_until = self.node.now + duration,
+            Disturbance::Glare(duration) => self.glare_until = self.node.now + duration,
+            Disturbance::Id(id) => self.node.rename(id),
             // A servo's.
             Disturbance::Sag(_) => {}
         }
@@ -191,32 +168,32 @@ impl Photometer {
 
     /// The bus watchdog: the lamp is out, and stays out.
     fn trip(&mut self) {
-        self.table.set(reg::BUS_WATCHDOG, TRIPPED);
+        self.node.trip();
         self.switch_lamp(false);
     }
 
     /// Whether light from outside fills every channel.
     pub(crate) fn glares(&self) -> bool {
-        self.now < self.glare_until
+        self.node.now < self.glare_until
     }
 
     fn switch_lamp(&mut self, on: bool) {
-        self.lamp.switch(self.now.as_secs_f64(), on);
-        self.table.set(reg::LAMP_ENABLE, i64::from(on));
+        self.lamp.switch(self.node.now.as_secs_f64(), on);
+        self.node.table.set(reg::LAMP_ENABLE, i64::from(on));
     }
 
     fn trigger(&mut self) {
-        let integration = Duration::from_micros(self.table.get(reg::INTEGRATION_TIME) as u64);
+        let integration = Duration::from_micros(self.node.table.get(reg::INTEGRATION_TIME) as u64);
         self.integration = Some(Integration {
-            start: self.now,
-            end: self.now + integration,
-            gain_step: self.table.get(reg::GAIN_STEP) as u8,
+            start: self.node.now,
+            end: self.node.now + integration,
+            gain_step: self.node.table.get(reg::GAIN_STEP) as u8,
             serial: self.triggers,
         });
         self.triggers += 1;
-        let sequence = (self.table.get(reg::SEQUENCE) + 1) % reg::MODULUS as i64;
-        self.table.set(reg::SEQUENCE, sequence);
-        self.table.set(reg::STATUS, INTEGRATING);
+        let sequence = (self.node.table.get(reg::SEQUENCE) + 1) % reg::MODULUS as i64;
+        self.node.table.set(reg::SEQUENCE, sequence);
+        self.node.table.set(reg::STATUS, INTEGRATING);
     }
 
     /// Ends the running integration with what it collected.
@@ -239,7 +216,7 @@ impl Photometer {
             (reg::STATUS, if exposed.saturated { SATURATED } else { READY }),
         ];
         for (register, value) in values {
-            self.table.set(register, value);
+            self.node.table.set(register, value);
         }
     }
 

@@ -13,17 +13,14 @@ use path::Path;
 use registers as reg;
 
 use crate::Device;
-use crate::fault::{Disturbance, Schedule};
+use crate::fault::Disturbance;
+use crate::node::Node;
 use crate::table::Table;
 
 /// Firmware that the simulated servos claim: the table with time-based profile, Clear and startup configuration.
 const FIRMWARE_VERSION: u8 = 46;
 /// Encoder counts per turn.
 const TURN: f64 = 4096.0;
-/// Unit of Bus Watchdog.
-const WATCHDOG_UNIT: Duration = Duration::from_millis(20);
-/// Value of Bus Watchdog once it has tripped.
-const TRIPPED: i64 = 0xFF;
 
 /// How a servo leaves the workshop: what the rig file and the `[sim]` table say of it.
 #[derive(Clone, Debug)]
@@ -54,8 +51,7 @@ pub(crate) struct Fitting {
 #[derive(Debug)]
 pub(crate) struct Servo {
     fitting: Fitting,
-    table: Table,
-    now: Duration,
+    node: Node,
     /// The profile as the servo computes it.
     profile: Path,
     /// Profile type in bits 4 and 5 of Moving Status.
@@ -64,37 +60,26 @@ pub(crate) struct Servo {
     shaft: Path,
     /// What the register does not know of the shaft's turns, counts.
     lost_turns: f64,
-    heard: Duration,
-    deaf_until: Duration,
-    silent_until: Duration,
     sags_until: Duration,
     stalled_until: Option<Duration>,
-    faults: Schedule,
 }
 
 impl Servo {
     pub(crate) fn new(fitting: Fitting) -> Self {
         let [low, high] = fitting.limits;
         let mut table = Table::new(reg::registers(fitting.model));
-        table.set(reg::ID, i64::from(fitting.id));
-        table.set(reg::BAUD, i64::from(fitting.baud_code));
         table.set(reg::RETURN_DELAY, fitting.return_delay.as_micros() as i64 / 2);
         table.set(reg::MIN_POSITION, low.floor().max(0.0) as i64);
         table.set(reg::MAX_POSITION, high.ceil().min(TURN - 1.0) as i64);
         let mut servo = Self {
             profile: Path::resting(fitting.start, 0.0),
             shaft: Path::resting(fitting.start, fitting.backlash / 2.0),
+            node: Node::new(table, fitting.id, fitting.baud_code),
             fitting,
-            table,
-            now: Duration::ZERO,
             profile_type: 0,
             lost_turns: 0.0,
-            heard: Duration::ZERO,
-            deaf_until: Duration::ZERO,
-            silent_until: Duration::ZERO,
             sags_until: Duration::ZERO,
             stalled_until: None,
-            faults: Schedule::default(),
         };
         servo.start_up();
         servo
@@ -122,70 +107,68 @@ impl Servo {
     }
 
     pub(crate) fn schedule(&mut self, at: Duration, what: Disturbance) {
-        self.faults.push(at, what);
+        self.node.faults.push(at, what);
     }
 
     /// When something happens by itself next: a motion or a boot ends, the watchdog trips, a fault sets in or ends.
     pub(crate) fn next_event(&self) -> Option<Duration> {
+        let [deaf, silent] = self.node.wakes();
         let motion_s = self.profile.end_s().max(self.shaft.end_s());
         // Rounded up, so that the motion is over by then.
         let motion = Duration::from_nanos((motion_s * 1e9).ceil() as u64);
-        [motion, self.deaf_until, self.silent_until, self.sags_until]
+        [motion, deaf, silent, self.sags_until]
             .map(Some)
             .into_iter()
-            .chain([self.watchdog(), self.stalled_until, self.faults.next()])
+            .chain([self.watchdog(), self.stalled_until, self.node.faults.next()])
             .flatten()
-            .filter(|&at| at > self.now)
+            .filter(|&at| at > self.node.now)
             .min()
     }
 
     /// When the bus watchdog will trip.
     fn watchdog(&self) -> Option<Duration> {
-        let units = self.table.get(reg::BUS_WATCHDOG);
-        let armed = self.torque() && units != 0 && units != TRIPPED;
-        armed.then(|| self.heard + WATCHDOG_UNIT * u32::try_from(units).expect("at most 127"))
+        self.node.watchdog(self.torque())
     }
 
     /// Lets time pass, in the order of what happens.
     pub(crate) fn advance_to(&mut self, t: Duration) {
-        while let Some(at) = [self.watchdog(), self.stalled_until, self.faults.next()]
+        while let Some(at) = [self.watchdog(), self.stalled_until, self.node.faults.next()]
             .into_iter()
             .flatten()
             .min()
             .filter(|&at| at <= t)
         {
-            self.now = self.now.max(at);
+            self.node.now = self.node.now.max(at);
             if self.watchdog() == Some(at) {
                 self.trip();
             } else if self.stalled_until == Some(at) {
                 self.release();
-            } else if let Some(what) = self.faults.pop(at) {
+            } else if let Some(what) = self.node.faults.pop(at) {
                 self.suffer(what);
             }
         }
-        self.now = self.now.max(t);
+        self.node.now = self.node.now.max(t);
     }
 
     fn suffer(&mut self, what: Disturbance) {
         match what {
-            Disturbance::Silence(duration) => self.silent_until = self.now + duration,
+            Disturbance::Silence(duration) => self.node.silence(duration),
             Disturbance::HardwareError(bits) => {
-                let bits = self.table.get(reg::HARDWARE_ERROR) | i64::from(bits);
-                self.table.set(reg::HARDWARE_ERROR, bits);
+                self.node.fail(bits);
                 if self.shut_down() {
-                    self.table.set(reg::TORQUE_ENABLE, 0);
+                    self.node.table.set(reg::TORQUE_ENABLE, 0);
                     self.stand();
                 }
             }
             Disturbance::Stall(duration) => {
-                self.stalled_until = Some(self.now + duration);
-                let now_s = self.now.as_secs_f64();
+                self.stalled_until = Some(self.node.now + duration);
+                let now_s = self.node.now.as_secs_f64();
                 self.shaft.jump(now_s, self.shaft.at(now_s).0);
             }
             Disturbance::Reboot => self.reboot(),
             Disturbance::WatchdogTrip => self.trip(),
-            Disturbance::Sag(duration) => self.sags_until = self.now + duration,
-            Disturbance::Id(id) => self.table.set(reg::ID, id.into()),
+            Disturbance::Sag(duration) => self.sags_until = self.node.now + duration,
+            Disturbance::Id(id) => self.node.rename(id),
             // The photometer's.
             Disturbance::RefusedTrigger
             | Disturbance::LostAcknowledgement
@@ -196,26 +179,27 @@ impl Servo {
 
     /// The bus watchdog: the arm stands, and goals are refused.
     fn trip(&mut self) {
-        self.table.set(reg::BUS_WATCHDOG, TRIPPED);
+        self.node.trip();
         self.stand();
     }
 
     /// Whether a hardware error that the Shutdown register names has taken the torque, until a reboot.
     fn shut_down(&self) -> bool {
-        self.table.get(reg::HARDWARE_ERROR) & self.table.get(reg::SHUTDOWN) != 0
+        self.node.table.get(reg::HARDWARE_ERROR) & self.node.table.get(reg::SHUTDOWN) != 0
     }
 
     fn torque(&self) -> bool {
-        self.table.get(reg::TORQUE_ENABLE) == 1
+        self.node.table.get(reg::TORQUE_ENABLE) == 1
     }
 
     /// Power comes on: turns are lost, torque is off, or on where Startup Configuration says so.
     fn start_up(&mut self) {
-        let shaft = self.direction() * self.shaft.at(self.now.as_secs_f64()).0;
+        let shaft = self.direction() * self.shaft.at(self.node.now.as_secs_f64()).0;
         self.lost_turns = (shaft / TURN).floor() * TURN;
-        self.table
-            .set(reg::TORQUE_ENABLE, self.table.get(reg::STARTUP) & 1);
-        self.heard = self.now;
+        self.node
+            .table
+            .set(reg::TORQUE_ENABLE, self.node.table.get(reg::STARTUP) & 1);
+        self.node.hear();
         self.stand();
     }
 }

@@ -2,53 +2,53 @@
 
 use std::time::Duration;
 
-use super::{Photometer, TRIPPED, reg};
+use super::{Photometer, reg};
 use crate::table::{Access, Register};
 use crate::{Device, Refusal};
 
 impl Device for Photometer {
     fn id(&self) -> u8 {
-        self.table.get(reg::ID) as u8
+        self.node.id()
     }
 
     fn baud(&self) -> u32 {
-        crate::baud::rate(self.table.get(reg::BAUD) as u8)
+        self.node.baud()
     }
 
     fn return_delay(&self) -> Duration {
-        Duration::from_micros(2 * self.table.get(reg::RETURN_DELAY) as u64)
+        self.node.return_delay()
     }
 
     fn status_return_level(&self) -> u8 {
-        self.table.get(reg::STATUS_RETURN_LEVEL) as u8
+        self.node.status_return_level()
     }
 
     fn alert(&self) -> bool {
-        self.table.get(reg::HARDWARE_ERROR) != 0
+        self.node.alert()
     }
 
     fn listens(&self) -> bool {
-        self.now >= self.deaf_until && self.now >= self.silent_until
+        self.node.listens()
     }
 
     fn heard(&mut self) {
-        self.heard = self.now;
+        self.node.hear();
     }
 
     fn read(&self, address: u16, length: u16) -> Result<Vec<u8>, Refusal> {
-        self.table.check_stretch(address, usize::from(length))?;
-        let mut live = self.table.clone();
-        let temperature = self.temperature_c(self.now.as_secs_f64());
+        self.node.table.check_stretch(address, usize::from(length))?;
+        let mut live = self.node.table.clone();
+        let temperature = self.temperature_c(self.node.now.as_secs_f64());
         live.set(reg::TEMPERATURE, temperature.round().clamp(0.0, 255.0) as i64);
-        live.set(reg::DOOR, i64::from(self.now < self.door_until));
-        live.set(reg::PRESENT_TIME, self.ticks(self.now));
+        live.set(reg::DOOR, i64::from(self.node.now < self.door_until));
+        live.set(reg::PRESENT_TIME, self.ticks(self.node.now));
         Ok((address..address + length)
             .map(|address| live.byte(address))
             .collect())
     }
 
     fn write(&mut self, address: u16, bytes: &[u8]) -> Result<(), Refusal> {
-        let values = self.table.parse(address, bytes)?;
+        let values = self.node.table.parse(address, bytes)?;
         self.check(&values)?;
         for (register, value) in values {
             self.apply(register, value);
@@ -57,14 +57,14 @@ impl Device for Photometer {
     }
 
     fn reboot(&mut self) {
-        let wire = self.table.get(reg::CLOCK);
+        let wire = self.node.table.get(reg::CLOCK);
         self.switch_lamp(false);
         self.integration = None;
-        self.table.reset(|register| register.access != Access::Eeprom);
-        self.table.set(reg::CLOCK, wire);
-        self.booted = self.now;
-        self.heard = self.now;
-        self.deaf_until = self.now + self.fitting.boot;
+        self.node.forget_ram();
+        self.node.table.set(reg::CLOCK, wire);
+        self.booted = self.node.now;
+        self.node.hear();
+        self.node.boot(self.fitting.boot);
     }
 
     /// There are no turns to clear.
@@ -73,14 +73,7 @@ impl Device for Photometer {
     }
 
     fn factory_reset(&mut self, option: u8) -> Result<(), Refusal> {
-        let kept: &[Register] = match option {
-            0xFF => &[],
-            1 => &[reg::ID],
-            2 => &[reg::ID, reg::BAUD],
-            _ => return Err(Refusal::DataRange),
-        };
-        self.table
-            .reset(|register| !kept.iter().any(|kept| kept.address == register.address));
+        self.node.factory_reset(option)?;
         self.reboot();
         Ok(())
     }
@@ -89,12 +82,12 @@ impl Device for Photometer {
 impl Photometer {
     /// Checks values that are within their registers' ranges against the state of the node, before any is taken.
     fn check(&mut self, values: &[(Register, i64)]) -> Result<(), Refusal> {
-        let tripped = self.table.get(reg::BUS_WATCHDOG) == TRIPPED;
+        let tripped = self.node.tripped();
         for &(register, value) in values {
             if register.access == Access::Eeprom && self.lamp.on() {
                 return Err(Refusal::Access);
             }
-            if register == reg::DELAY && self.table.get(reg::CLOCK) == 0 {
+            if register == reg::DELAY && self.node.table.get(reg::CLOCK) == 0 {
                 return Err(Refusal::Access);
             }
             let kept_dark =
@@ -118,14 +111,14 @@ impl Photometer {
         match register {
             // After a hardware error the lamp stays off until a reboot.
             reg::LAMP_ENABLE if value == 0 || !self.alert() => {
-                self.heard = self.now;
+                self.node.hear();
                 self.switch_lamp(value == 1);
             }
             reg::LAMP_ENABLE => {}
             reg::TRIGGER if value == 1 => self.trigger(),
             reg::TRIGGER => {}
             reg::DELAY => self.delay = Some(Duration::from_micros(value as u64)),
-            _ => self.table.set(register, value),
+            _ => self.node.table.set(register, value),
         }
     }
 }

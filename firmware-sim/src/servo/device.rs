@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Servo, TRIPPED, TURN, reg};
+use super::{Servo, TURN, reg};
 use crate::table::{Access, Register};
 use crate::{Device, Refusal};
 
@@ -11,35 +11,35 @@ const CLEAR_TURNS: [u8; 5] = [0x01, 0x44, 0x58, 0x4C, 0x22];
 
 impl Device for Servo {
     fn id(&self) -> u8 {
-        self.table.get(reg::ID) as u8
+        self.node.id()
     }
 
     fn baud(&self) -> u32 {
-        crate::baud::rate(self.table.get(reg::BAUD) as u8)
+        self.node.baud()
     }
 
     fn return_delay(&self) -> Duration {
-        Duration::from_micros(2 * self.table.get(reg::RETURN_DELAY) as u64)
+        self.node.return_delay()
     }
 
     fn status_return_level(&self) -> u8 {
-        self.table.get(reg::STATUS_RETURN_LEVEL) as u8
+        self.node.status_return_level()
     }
 
     fn alert(&self) -> bool {
-        self.table.get(reg::HARDWARE_ERROR) != 0
+        self.node.alert()
     }
 
     fn listens(&self) -> bool {
-        self.now >= self.deaf_until && self.now >= self.silent_until
+        self.node.listens()
     }
 
     fn heard(&mut self) {
-        self.heard = self.now;
+        self.node.hear();
     }
 
     fn read(&self, address: u16, length: u16) -> Result<Vec<u8>, Refusal> {
-        self.table.check_stretch(address, usize::from(length))?;
+        self.node.table.check_stretch(address, usize::from(length))?;
         let live = self.live();
         Ok((address..address + length)
             .map(|address| live.byte(self.target(address)))
@@ -47,10 +47,10 @@ impl Device for Servo {
     }
 
     fn write(&mut self, address: u16, bytes: &[u8]) -> Result<(), Refusal> {
-        self.table.check_stretch(address, bytes.len())?;
+        self.node.table.check_stretch(address, bytes.len())?;
         let mut values = Vec::new();
         for (address, bytes) in self.direct(address, bytes) {
-            values.extend(self.table.parse(address, &bytes)?);
+            values.extend(self.node.table.parse(address, &bytes)?);
         }
         self.check(&values)?;
         for (register, value) in values {
@@ -60,12 +60,12 @@ impl Device for Servo {
     }
 
     fn registered(&mut self, waits: bool) {
-        self.table.set(reg::REGISTERED_INSTRUCTION, i64::from(waits));
+        self.node.table.set(reg::REGISTERED_INSTRUCTION, i64::from(waits));
     }
 
     fn reboot(&mut self) {
-        self.table.reset(|register| register.access != Access::Eeprom);
-        self.deaf_until = self.now + self.fitting.boot;
+        self.node.forget_ram();
+        self.node.boot(self.fitting.boot);
         self.start_up();
     }
 
@@ -76,21 +76,14 @@ impl Device for Servo {
         if self.moves() {
             return Err(Refusal::Result);
         }
-        let shaft = self.direction() * self.shaft.at(self.now.as_secs_f64()).0;
+        let shaft = self.direction() * self.shaft.at(self.node.now.as_secs_f64()).0;
         self.lost_turns = (shaft / TURN).floor() * TURN;
         self.stand();
         Ok(())
     }
 
     fn factory_reset(&mut self, option: u8) -> Result<(), Refusal> {
-        let kept: &[Register] = match option {
-            0xFF => &[],
-            1 => &[reg::ID],
-            2 => &[reg::ID, reg::BAUD],
-            _ => return Err(Refusal::DataRange),
-        };
-        self.table
-            .reset(|register| !kept.iter().any(|kept| kept.address == register.address));
+        self.node.factory_reset(option)?;
         self.reboot();
         Ok(())
     }
@@ -100,7 +93,7 @@ impl Servo {
     /// Where an address leads: itself, or what its indirect address register says. One level deep; the cells of the
     /// indirect areas are what they are unless mapped.
     fn target(&self, address: u16) -> u16 {
-        reg::indirect(address).map_or(address, |register| self.table.get(register) as u16)
+        reg::indirect(address).map_or(address, |register| self.node.table.get(register) as u16)
     }
 
     /// A write as writes to whole stretches of direct addresses.
@@ -120,10 +113,10 @@ impl Servo {
 
     /// Checks values that are within their registers' ranges against the state of the servo, before any is taken.
     fn check(&self, values: &[(Register, i64)]) -> Result<(), Refusal> {
-        let tripped = self.table.get(reg::BUS_WATCHDOG) == TRIPPED;
+        let tripped = self.node.tripped();
         values.iter().try_for_each(|&(register, value)| {
             let is = |other: Register| register.address == other.address;
-            let within = |limit: Register| value.abs() <= self.table.get(limit);
+            let within = |limit: Register| value.abs() <= self.node.table.get(limit);
             if register.access == Access::Eeprom && self.torque() {
                 return Err(Refusal::Access);
             }
@@ -156,13 +149,13 @@ impl Servo {
             if self.shut_down() {
                 return;
             }
-            if self.table.get(reg::DRIVE_MODE) & 8 != 0 {
+            if self.node.table.get(reg::DRIVE_MODE) & 8 != 0 {
                 self.switch_torque(true);
             }
-            self.table.set(register, value);
+            self.node.table.set(register, value);
             self.set_off();
         } else {
-            self.table.set(register, value);
+            self.node.table.set(register, value);
             if register.access == Access::Eeprom {
                 self.remap();
             }
@@ -174,15 +167,15 @@ impl Servo {
         if on == self.torque() || on && self.shut_down() {
             return;
         }
-        self.table.set(reg::TORQUE_ENABLE, i64::from(on));
-        self.heard = self.now;
+        self.node.table.set(reg::TORQUE_ENABLE, i64::from(on));
+        self.node.hear();
         self.stand();
     }
 
     /// Direction, mode or offset may have changed: a single turn counts from 0 again.
     fn remap(&mut self) {
         if self.goal_limits().is_some() {
-            let shaft = self.direction() * self.shaft.at(self.now.as_secs_f64()).0;
+            let shaft = self.direction() * self.shaft.at(self.node.now.as_secs_f64()).0;
             self.lost_turns = (shaft / TURN).floor() * TURN;
         }
         self.stand();

@@ -36,7 +36,7 @@ const CURRENT_BASED: i64 = 5;
 impl Servo {
     /// +1, or −1 where the drive mode reverses.
     pub(super) fn direction(&self) -> f64 {
-        match self.table.get(reg::DRIVE_MODE) & 1 {
+        match self.node.table.get(reg::DRIVE_MODE) & 1 {
             0 => 1.0,
             _ => -1.0,
         }
@@ -46,7 +46,7 @@ impl Servo {
     /// modes the shaft stands still.
     pub(super) fn positions(&self) -> bool {
         matches!(
-            self.table.get(reg::OPERATING_MODE),
+            self.node.table.get(reg::OPERATING_MODE),
             POSITION | EXTENDED | CURRENT_BASED
         )
     }
@@ -54,16 +54,16 @@ impl Servo {
     /// Range of Goal Position in a single turn; `None` in the other modes.
     pub(super) fn goal_limits(&self) -> Option<(i64, i64)> {
         let limits = (
-            self.table.get(reg::MIN_POSITION),
-            self.table.get(reg::MAX_POSITION),
+            self.node.table.get(reg::MIN_POSITION),
+            self.node.table.get(reg::MAX_POSITION),
         );
-        (self.table.get(reg::OPERATING_MODE) == POSITION).then_some(limits)
+        (self.node.table.get(reg::OPERATING_MODE) == POSITION).then_some(limits)
     }
 
     /// In position mode an offset of more than a quarter turn is ignored (e-manual, "Homing Offset").
     fn homing(&self) -> f64 {
-        let offset = self.table.get(reg::HOMING_OFFSET);
-        let ignored = self.table.get(reg::OPERATING_MODE) == POSITION && offset.abs() > 1024;
+        let offset = self.node.table.get(reg::HOMING_OFFSET);
+        let ignored = self.node.table.get(reg::OPERATING_MODE) == POSITION && offset.abs() > 1024;
         if ignored { 0.0 } else { offset as f64 }
     }
 
@@ -78,23 +78,23 @@ impl Servo {
     }
 
     fn present(&self) -> i64 {
-        self.shown(self.shaft.at(self.now.as_secs_f64()).0)
+        self.shown(self.shaft.at(self.node.now.as_secs_f64()).0)
     }
 
     /// Whether a profile is under way or the shaft turns faster than the threshold.
     pub(super) fn moves(&self) -> bool {
-        let now_s = self.now.as_secs_f64();
-        let threshold = self.table.get(reg::MOVING_THRESHOLD) as f64 * VELOCITY;
+        let now_s = self.node.now.as_secs_f64();
+        let threshold = self.node.table.get(reg::MOVING_THRESHOLD) as f64 * VELOCITY;
         now_s < self.profile.end_s() || self.shaft.at(now_s).1.abs() > threshold
     }
 
     /// Stops at once where the shaft is, which becomes the goal.
     pub(super) fn stand(&mut self) {
-        let now_s = self.now.as_secs_f64();
+        let now_s = self.node.now.as_secs_f64();
         let (position, _) = self.shaft.at(now_s);
         self.shaft.jump(now_s, position);
         self.profile.jump(now_s, position);
-        self.table.set(reg::GOAL_POSITION, self.present());
+        self.node.table.set(reg::GOAL_POSITION, self.present());
     }
 
     /// Sets off towards Goal Position, from the velocity that the profile has now.
@@ -102,9 +102,9 @@ impl Servo {
         if !self.torque() || !self.positions() {
             return;
         }
-        let now_s = self.now.as_secs_f64();
-        let goal = self.meant(self.table.get(reg::GOAL_POSITION));
-        let limit = self.table.get(reg::VELOCITY_LIMIT) as f64 * VELOCITY;
+        let now_s = self.node.now.as_secs_f64();
+        let goal = self.meant(self.node.table.get(reg::GOAL_POSITION));
+        let limit = self.node.table.get(reg::VELOCITY_LIMIT) as f64 * VELOCITY;
         if limit == 0.0 {
             return;
         }
@@ -123,19 +123,19 @@ impl Servo {
             }
         };
         if self.stalled_until.is_none() {
-            let start_s = (self.now + self.fitting.lag).as_secs_f64();
+            let start_s = (self.node.now + self.fitting.lag).as_secs_f64();
             self.shaft.go(start_s, goal, shaft_profile);
         }
     }
 
     /// What the profile registers say, in counts; `None`: no profile, the goal is taken as a step.
     fn profile_towards(&mut self, goal: f64, limit: f64) -> Option<Profile> {
-        let velocity = self.table.get(reg::PROFILE_VELOCITY) as f64;
-        let acceleration = self.table.get(reg::PROFILE_ACCELERATION) as f64;
-        let distance = (goal - self.profile.at(self.now.as_secs_f64()).0).abs();
+        let velocity = self.node.table.get(reg::PROFILE_VELOCITY) as f64;
+        let acceleration = self.node.table.get(reg::PROFILE_ACCELERATION) as f64;
+        let distance = (goal - self.profile.at(self.node.now.as_secs_f64()).0).abs();
         let (velocity, acceleration) = if velocity == 0.0 {
             return None;
-        } else if self.table.get(reg::DRIVE_MODE) & 4 == 0 {
+        } else if self.node.table.get(reg::DRIVE_MODE) & 4 == 0 {
             ((velocity * VELOCITY).min(limit), acceleration * ACCELERATION)
         } else {
             // Time-based: the whole motion and its acceleration in ms, the latter at most half of it.
@@ -164,15 +164,15 @@ impl Servo {
     /// A stall ends: the shaft goes on to the goal from where it was stuck.
     pub(super) fn release(&mut self) {
         self.stalled_until = None;
-        let now_s = self.now.as_secs_f64();
+        let now_s = self.node.now.as_secs_f64();
         self.profile.jump(now_s, self.shaft.at(now_s).0);
         self.set_off();
     }
 
     /// The table as it reads now.
     pub(super) fn live(&self) -> Table {
-        let mut table = self.table.clone();
-        let now_s = self.now.as_secs_f64();
+        let mut table = self.node.table.clone();
+        let now_s = self.node.now.as_secs_f64();
         let (shaft, velocity) = self.shaft.at(now_s);
         let (planned, planned_velocity) = self.profile.at(now_s);
         let present = self.present();
@@ -187,7 +187,7 @@ impl Servo {
         let limit = (table.get(reg::VELOCITY_LIMIT) as f64 * VELOCITY).max(1.0);
         let pwm = (self.direction() * velocity / limit * PWM).clamp(-PWM, PWM);
         let warmth = SELF_HEATING_C * -(-now_s / WARMING_S).exp_m1();
-        table.set(reg::REALTIME_TICK, (self.now.as_millis() % TICKS) as i64);
+        table.set(reg::REALTIME_TICK, (self.node.now.as_millis() % TICKS) as i64);
         table.set(reg::MOVING, i64::from(self.moves()));
         table.set(reg::MOVING_STATUS, i64::from(self.moving_status(present, behind)));
         table.set(reg::PRESENT_PWM, pwm as i64);
@@ -196,7 +196,7 @@ impl Servo {
         table.set(reg::PRESENT_POSITION, present);
         table.set(reg::VELOCITY_TRAJECTORY, speed(planned_velocity));
         table.set(reg::POSITION_TRAJECTORY, self.shown(planned));
-        let sags = self.now < self.sags_until;
+        let sags = self.node.now < self.sags_until;
         let sag = (Disturbance::SAG_V * 10.0) as i64;
         table.set(reg::PRESENT_VOLTAGE, if sags { sag } else { VOLTAGE });
         table.set(
@@ -210,8 +210,8 @@ impl Servo {
         if !self.torque() || !self.positions() {
             return 0;
         }
-        let ongoing = self.now.as_secs_f64() < self.profile.end_s();
-        let off = (present - self.table.get(reg::GOAL_POSITION)).abs() as f64;
+        let ongoing = self.node.now.as_secs_f64() < self.profile.end_s();
+        let off = (present - self.node.table.get(reg::GOAL_POSITION)).abs() as f64;
         u8::from(off <= IN_POSITION)
             | u8::from(ongoing) << 1
             | u8::from(behind) << 3
