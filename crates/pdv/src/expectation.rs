@@ -49,7 +49,7 @@ pub struct Signs {
 /// By how much more readings are expected to lower the error.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Worth {
-    /// A plane in each gap between the planes and at their ends: θ_r in rad, and the gain.
+    /// A plane in each gap between the planes and at their ends: θ_r in rad, up to 80°, and the gain.
     pub planes: Vec<(f64, f64)>,
     /// Twice the readings of each plane, in the order of the planes.
     pub readings: Vec<f64>,
@@ -97,10 +97,16 @@ impl Expectation {
             sides: sides.unwrap_or(form),
             level: over.over_all(whole.iter().copied()),
         };
+        // A plane that is left out takes the error of its own readings with it, which no other plane would lower.
+        let between: Vec<f64> = apart
+            .iter()
+            .zip(&halves)
+            .map(|(apart, half)| (apart - half).max(0.0))
+            .collect();
         Ok(Self {
             male: signs.male(planes.iter().filter(|plane| !plane.is_empty()).count()),
             worth: Worth {
-                planes: gaps(planes, &apart),
+                planes: gaps(planes, &between),
                 // What halving changes is four times of what doubling does, where the error goes with the square of
                 // the distance between readings.
                 readings: halves.iter().map(|half| half / 4.0).collect(),
@@ -141,7 +147,7 @@ impl Signs {
 }
 
 /// Weights of [`Signs::terms`].
-const WEIGHTS: [f64; 8] = [-2.2299, 0.0723, 0.3044, 0.3009, -0.0776, 0.0028, 0.0338, -0.0968];
+const WEIGHTS: [f64; 8] = [-1.6913, 0.1500, 0.1073, 0.2652, 0.0297, 0.0318, 0.1038, -0.6883];
 
 /// Pairs of the scene, each with its share of all that is looked at, and the channels that count.
 struct Over {
@@ -251,13 +257,14 @@ fn every_other(readings: &[Observation], of: impl Fn(&Observation) -> f64) -> Ve
     kept.map(|(_, o)| *o).collect()
 }
 
-/// For a plane in the middle of every gap its θ_r and what it is worth, when leaving a plane out changes so much.
+/// For a plane in the middle of every gap its θ_r and what it is worth, when leaving a plane out changes so much between
+/// the planes. Beyond the last plane it stands at 80° at most, where what is looked at ends.
 ///
 /// A gap twice as wide has four times the error; leaving a plane out widens its own to the sum of both beside it.
-fn gaps(planes: &[Vec<Observation>], apart: &[f64]) -> Vec<(f64, f64)> {
+fn gaps(planes: &[Vec<Observation>], between: &[f64]) -> Vec<(f64, f64)> {
     let mut known: Vec<(f64, f64)> = planes
         .iter()
-        .zip(apart)
+        .zip(between)
         .filter_map(|(plane, &change)| {
             let theta_r = plane.iter().map(|o| o.theta_r).sum::<f64>() / plane.len() as f64;
             (!plane.is_empty()).then_some((theta_r, change))
@@ -280,7 +287,7 @@ fn gaps(planes: &[Vec<Observation>], apart: &[f64]) -> Vec<(f64, f64)> {
         .map(|n| {
             let (low, high) = (at(n).max(0.0), at(n + 1));
             let gain = 0.5 * (bend(n) + bend(n + 1)) * (high - low).powi(2);
-            (0.5 * (low + high), gain)
+            ((0.5 * (low + high)).min(THETA_MAX), gain)
         })
         .collect()
 }

@@ -61,6 +61,45 @@ fn it_stops_at_the_budget_and_says_so() {
     );
 }
 
+/// With minutes to spend it goes on gaining: the mean over materials of all kinds is well below that of less time.
+#[test]
+fn more_time_buys_a_smaller_error() {
+    let names = [
+        "gold-paint",
+        "blue-rubber",
+        "nylon",
+        "chrome",
+        "special-walnut-224",
+        "purple-paint",
+    ];
+    let mut means = [0.0; 2];
+    for name in names {
+        let material = Fitted::named(name).expect("a fitted material");
+        for (mean, budget_s) in means.iter_mut().zip([50, 120]) {
+            let measured = captured(&material, &format!("[sweep]\nbudget_s = {budget_s}\n"));
+            let (male, expected) = errors(&material, &measured);
+            let readings: Vec<usize> = measured.planes.iter().map(Vec::len).collect();
+            println!("{name}, {budget_s} s: expected {expected:.5}, found {male:.5}, planes of {readings:?}");
+            *mean += male / names.len() as f64;
+        }
+    }
+    println!("mean MALE {means:.6?}");
+    assert!(means[1] < 0.85 * means[0], "{means:?}");
+}
+
+/// What is added is as dense as what is there: a plane of fewer readings between denser ones would do harm.
+#[test]
+fn a_plane_that_is_added_has_as_many_readings_as_the_densest() {
+    let rig = RigFile::parse(RigFile::BUILT_IN, "built-in".as_ref()).expect("a good rig file");
+    let mechanics = capture::mechanics(&rig, None);
+    let text = FIRST.replacen("readings = 16", "readings = 40", 1);
+    let job = Job::parse(&text, "job.toml").expect("a good job");
+    let plan = sweep::plan(&job, &mechanics).expect("the rig can do it");
+    let steps = sweep::add(&job, &plan, sweep::Addition::Plane(0.8), &mechanics).expect("the rig can do it");
+    assert_eq!(steps.len(), 40);
+    assert!(steps.iter().all(|step| step.sweep == sweep::Sweep::Plane(2)));
+}
+
 #[test]
 fn it_stops_at_the_target_and_says_so() {
     let material = Fitted::named("gold-paint").expect("a fitted material");

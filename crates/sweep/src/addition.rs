@@ -11,7 +11,8 @@ use crate::{Job, Mechanics, Plan, Plane, Step, Sweep, SweepError, unread};
 /// What may be added to a plan while it runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Addition {
-    /// A plane at a new θ_r, rad, with the readings and the distribution of the job's first plane.
+    /// A plane at a new θ_r, rad, distributed as the job's first, with as many readings as the plane has that has most:
+    /// a sparser one among denser ones would make values worse that were interpolated between those.
     Plane(f64),
     /// A reading between any two neighbours of a plane, by its index, or of the arc.
     Between(Sweep),
@@ -38,7 +39,10 @@ pub fn add(
     let reach = Reach::new(mechanics, Some(standing.pose));
     let mut targets = match addition {
         Addition::Plane(theta_r) => {
-            let grown = job.grown(plan).with_plane(theta_r);
+            let grown = job.grown(plan);
+            let readings = (0..grown.planes.len()).map(|n| planned(plan, Sweep::Plane(n)));
+            let most = readings.max().unwrap_or(1);
+            let grown = grown.with_plane(theta_r, most);
             plane(&grown, grown.planes.len() - 1, reach)?
         }
         Addition::Between(sweep) => between(plan, sweep, reach),
@@ -102,16 +106,15 @@ impl Job {
             .iter()
             .find(|step| step.sweep == Sweep::Plane(grown.planes.len()))
         {
-            grown = grown.with_plane(step.pose().sensor.rad().abs());
+            grown = grown.with_plane(step.pose().sensor.rad().abs(), planned(plan, step.sweep));
         }
         grown
     }
 
-    /// With one plane more, whose readings are those of the first.
-    fn with_plane(mut self, theta_r: f64) -> Self {
-        let (readings, distribution) = self.planes.first().map_or((1, Distribution::Lobe), |plane| {
-            (plane.readings, plane.distribution)
-        });
+    /// With one plane more, distributed as the first.
+    fn with_plane(mut self, theta_r: f64, readings: usize) -> Self {
+        let first = self.planes.first();
+        let distribution = first.map_or(Distribution::Lobe, |plane| plane.distribution);
         self.planes.push(Plane {
             theta_r,
             readings,
@@ -119,4 +122,9 @@ impl Job {
         });
         self
     }
+}
+
+/// Readings that a plan has of a sweep.
+fn planned(plan: &Plan, sweep: Sweep) -> usize {
+    plan.steps.iter().filter(|step| step.sweep == sweep).count()
 }
