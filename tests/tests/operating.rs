@@ -8,7 +8,7 @@ use std::path::Path;
 
 /// Enums whose variants are codes, as files, the API and the page spell them.
 const CODES: [(&str, &str); 4] = [
-    ("crates/goniod/src/view.rs", "FaultCode"),
+    ("crates/goniod/src/view/fault.rs", "FaultCode"),
     ("crates/goniod/src/state.rs", "JobState"),
     ("crates/rig/src/fault.rs", "FaultKind"),
     ("crates/capture/src/reading.rs", "Flag"),
