@@ -27,7 +27,7 @@ pub use grid::{Grid, GridPlan, GridRow, Source};
 pub use judge::Score;
 pub use material::Material;
 pub use measure::{Measured, measure};
-pub use paper::{Angle, Evaluation, Plane, Row, Summary, VirtualArc};
+pub use paper::{Angle, Evaluation, Nodes, Row, Summary};
 pub use study::{Kind, Progress, Study};
 
 pub(crate) use study::read;

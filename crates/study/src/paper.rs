@@ -10,7 +10,7 @@ mod run;
 mod spheres;
 mod summary;
 
-pub use evaluation::{Evaluation, Plane, VirtualArc};
+pub use evaluation::{Evaluation, Nodes};
 pub use row::Row;
 pub(crate) use run::run;
 pub use summary::{Angle, Summary};

@@ -36,7 +36,7 @@ pub(crate) fn all(evaluation: &Evaluation, rows: &[Row]) -> Result<Vec<(String, 
 /// ln(1 + f), mean of the channels, over the index of d_p, at φ_p = 0.
 fn slice(evaluation: &Evaluation, material: &Material) -> Result<Figure, Error> {
     let theta_r = SLICE_DEG.to_radians();
-    let deviations = evaluation.plane.deviations(theta_r);
+    let deviations = evaluation.nodes.deviations();
     let values = |brdf: &dyn Brdf| -> Vec<(f64, f64)> {
         let at = |(i, &d_p): (usize, &f64)| {
             let (incident, exitant) = Pdv::in_plane(theta_r, d_p).directions()?;
@@ -114,14 +114,16 @@ fn density() -> Figure {
 
 /// Where each distribution puts the values of d_p.
 fn samples(evaluation: &Evaluation) -> Figure {
-    let theta_r = evaluation.shown;
     let curve = |(name, distribution, colour)| {
-        let plane = super::Plane {
+        let nodes = super::Nodes {
             distribution,
-            ..evaluation.plane
+            ..evaluation.nodes
         };
-        let points = plane.deviations(theta_r);
-        let points = points.into_iter().enumerate().map(|(i, d_p)| (i as f64, d_p));
+        let points = nodes
+            .deviations()
+            .into_iter()
+            .enumerate()
+            .map(|(i, d_p)| (i as f64, d_p));
         Curve::new(name, colour, Mark::Line, points.collect())
     };
     let distributions = [
@@ -130,11 +132,11 @@ fn samples(evaluation: &Evaluation) -> Figure {
         ("uniform", Distribution::Uniform, COLOURS[7]),
     ];
     Figure {
-        title: format!("Figure 3: values of d_p at θ_r = {:.0}°", theta_r.to_degrees()),
+        title: "Figure 3: nodes of d_p".to_owned(),
         x: Axis {
-            label: "index of the reading",
+            label: "index of the node",
             log: false,
-            ends: [0.0, evaluation.plane.readings as f64],
+            ends: [0.0, evaluation.nodes.d_p as f64],
         },
         y: Axis {
             label: "d_p",

@@ -3,7 +3,7 @@ use std::ops::RangeInclusive;
 use pdv::{Distribution, Draw};
 use serde::Deserialize;
 
-use super::{Evaluation, Plane, VirtualArc};
+use super::{Evaluation, Nodes};
 use crate::check::Check;
 use crate::material::Names;
 use crate::{Error, Kind};
@@ -14,26 +14,24 @@ struct RawStudy {
     #[serde(rename = "study")]
     _kind: Kind,
     materials: Names,
+    grid: RawGrid,
     plane: RawPlane,
-    arc: RawArc,
     compare: RawCompare,
     spheres: RawSpheres,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawPlane {
-    theta_r_deg: Vec<f64>,
-    readings: usize,
+struct RawGrid {
+    theta_r: usize,
+    d_p: usize,
     distribution: Distribution,
-    light_max_deg: f64,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct RawArc {
-    readings: usize,
-    theta_max_deg: f64,
+struct RawPlane {
+    theta_r_deg: Vec<f64>,
 }
 
 #[derive(Deserialize)]
@@ -51,7 +49,7 @@ struct RawSpheres {
     theta_r_deg: f64,
 }
 
-const READINGS: RangeInclusive<usize> = 1..=2000;
+const NODES: RangeInclusive<usize> = 2..=2000;
 
 impl Evaluation {
     /// Reads the text of a study file; `file` names it in errors. A `quick` one has a hundredth of the pairs.
@@ -64,40 +62,20 @@ impl Evaluation {
         if raw.plane.theta_r_deg.is_empty() {
             return Err(check.range("plane.theta_r_deg", "empty", "at least one angle"));
         }
-        for theta in &raw.plane.theta_r_deg {
-            check.number(
-                "plane.theta_r_deg",
-                *theta,
-                (0.0..90.0).contains(theta),
-                "0 … below 90",
-            )?;
+        let RawGrid {
+            theta_r,
+            d_p,
+            distribution,
+        } = raw.grid;
+        check.number("grid.theta_r", theta_r, NODES.contains(&theta_r), "2 … 2000")?;
+        check.number("grid.d_p", d_p, NODES.contains(&d_p), "2 … 2000")?;
+        for deg in &raw.plane.theta_r_deg {
+            let node = deg * theta_r as f64 / 90.0;
+            let good = (0.0..90.0).contains(deg) && (node - node.round()).abs() < 1e-9;
+            let allowed = "a node of the grid: a multiple of 90/grid.theta_r, 0 … below 90";
+            check.number("plane.theta_r_deg", *deg, good, allowed)?;
         }
-        let (plane, arc, compare) = (&raw.plane, &raw.arc, &raw.compare);
-        let quarter = 0.0..=90.0;
-        check.number(
-            "plane.readings",
-            plane.readings,
-            READINGS.contains(&plane.readings),
-            "1 … 2000",
-        )?;
-        check.number(
-            "plane.light_max_deg",
-            plane.light_max_deg,
-            quarter.contains(&plane.light_max_deg),
-            "0 … 90",
-        )?;
-        check.number(
-            "arc.readings",
-            arc.readings,
-            READINGS.contains(&arc.readings),
-            "1 … 2000",
-        )?;
-        check.number(
-            "arc.theta_max_deg",
-            arc.theta_max_deg,
-            quarter.contains(&arc.theta_max_deg),
-            "0 … 90",
-        )?;
+        let compare = &raw.compare;
         check.number(
             "compare.pairs",
             compare.pairs,
@@ -123,14 +101,10 @@ impl Evaluation {
             spheres: raw.spheres.materials.materials(file)?,
             shown: shown.to_radians(),
             theta_r: raw.plane.theta_r_deg.iter().map(|deg| deg.to_radians()).collect(),
-            plane: Plane {
-                readings: plane.readings,
-                distribution: plane.distribution,
-                light_max: plane.light_max_deg.to_radians(),
-            },
-            arc: VirtualArc {
-                readings: arc.readings,
-                theta_max: arc.theta_max_deg.to_radians(),
+            nodes: Nodes {
+                theta_r,
+                d_p,
+                distribution,
             },
             draw: Draw {
                 pairs: if quick {
@@ -168,8 +142,17 @@ mod tests {
         assert_eq!(study.materials.len(), 100);
         assert_eq!(study.theta_r.len(), 4);
         assert_eq!(study.draw.pairs, 3_600_000);
-        assert_eq!(study.plane.deviations(1.0).len(), 90);
-        assert_eq!(study.arc.thetas().len(), 90);
+        let nodes = study.nodes;
+        let (d_p, thetas) = (nodes.deviations(), nodes.thetas().collect::<Vec<_>>());
+        assert_eq!((thetas.len(), d_p.len()), (90, 90));
+        assert_eq!((d_p[0], d_p[89]), (0.0, 2.0));
+        // Every plane stands at a node of the arc.
+        for theta_r in study.theta_r {
+            assert!(
+                thetas.iter().any(|theta| (theta - theta_r).abs() < 1e-12),
+                "{theta_r}"
+            );
+        }
     }
 
     #[test]
@@ -179,7 +162,11 @@ mod tests {
             text.contains("study.toml") && text.contains("speed") && text.contains("line"),
             "{text}"
         );
-        assert!(error("[45.0,", "[95.0,").contains("plane.theta_r_deg is 95, allowed is 0 … below 90"));
+        assert!(error("[45.0,", "[95.0,").contains("plane.theta_r_deg is 95, allowed is a node of the grid"));
+        assert!(
+            error("[45.0,", "[44.5,").contains("plane.theta_r_deg is 44.5, allowed is a node of the grid")
+        );
+        assert!(error("d_p = 90", "d_p = 1").contains("grid.d_p is 1, allowed is 2 … 2000"));
         assert!(error("pairs = 3_600_000", "pairs = 0").contains("compare.pairs is 0, allowed is 1 … 1e10"));
         assert!(error("materials = \"all\"", "materials = [\"chrom\"]").contains("did you mean chrome"));
         assert!(error("materials = \"all\"", "materials = []").contains("at least one name"));
