@@ -69,7 +69,7 @@ fn the_shipped_study_covers_the_grid() {
     let text = include_str!("../../../config/studies/error-against-time.toml");
     let grid = study::Grid::parse(text, "error-against-time.toml", false).unwrap();
     assert_eq!((grid.materials.len(), grid.known.len()), (20, 100));
-    assert_eq!(grid.plans.len(), 9 * 6 * 5 + 6);
+    assert_eq!(grid.plans.len(), 9 * 6 * 6 + 6);
     for number in [1, 2, 3, 4, 7] {
         assert!(grid.plans.iter().any(|plan| plan.planes_deg.len() == number));
     }
