@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use brdf::{Brdf, Fitted, Spherical};
+use brdf::{Brdf, Fitted, HalfDifference, Spherical};
 use glam::DVec3;
 use pdv::{Bivariate, Model, Observation, Pdv, Planes, Separable};
 
@@ -197,6 +197,26 @@ fn ln_of_what_is_small_keeps_its_digits() {
     let f = 1e-12_f64;
     assert!((f.ln_1p().exp_m1() / f - 1.0).abs() < 1e-15);
     assert!((((1.0 + f).ln().exp() - 1.0) / f - 1.0).abs() > 5e-5);
+}
+
+/// f32 against f64: half angles as large as a sharp lobe's width, of directions that are given in f32.
+#[test]
+fn a_half_angle_in_f32_is_lost_near_the_mirror_direction() {
+    let half = 3e-4_f64;
+    let [mut naive, mut found] = [0.0_f64; 2];
+    for n in 0..1400 {
+        let theta = 1e-3 * f64::from(n);
+        let at = |theta: f64| DVec3::new(theta.sin(), 0.0, theta.cos());
+        let (incident, exitant) = (at(-theta - 2.0 * half).as_vec3(), at(theta).as_vec3());
+        let naive_rad = f64::from((incident + exitant).normalize().z.min(1.0).acos());
+        naive = naive.max((naive_rad - half).abs());
+        let rounded = HalfDifference::from_directions(incident.as_dvec3(), exitant.as_dvec3());
+        found = found.max((rounded.theta_h - half).abs());
+    }
+    println!("off by {naive:.1e} rad with the arc cosine in f32, by {found:.1e} rad with sums in f64");
+    assert!(naive >= half, "the arc cosine in f32 was good: {naive}");
+    // What rounding the directions themselves costs.
+    assert!(found < 2e-7, "{found}");
 }
 
 /// f32 against f64: the table beside the formula, over what a renderer asks for.
