@@ -2,12 +2,16 @@
 
 mod baseline;
 mod document;
+mod figures;
 mod file;
 mod front;
+mod outcome;
 mod pca;
 mod plan;
 mod row;
 mod run;
+mod summary;
+mod words;
 
 pub use file::Grid;
 pub use plan::GridPlan;
