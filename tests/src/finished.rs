@@ -38,18 +38,35 @@ impl Finished {
     }
 }
 
+/// A command that starts a program whose files may not grow beyond so many blocks of 512 bytes. It stands for a full
+/// disk: the write fails, in a process that is told so and not killed for it.
+pub fn on_a_full_disk(program: &str, blocks: u32) -> Command {
+    let mut shell = Command::new("sh");
+    let limited = format!(r#"trap '' XFSZ; ulimit -f {blocks}; exec "$0" "$@""#);
+    shell.args(["-c", &limited, program]);
+    shell
+}
+
 /// Runs a program in a directory until it ends.
 ///
 /// # Panics
 /// If it cannot be started.
 pub fn run(program: &str, directory: &Path, arguments: &[&str]) -> Finished {
-    let output = Command::new(program)
+    run_by(Command::new(program), directory, arguments)
+}
+
+/// Runs a command, with these arguments more, in a directory until it ends.
+///
+/// # Panics
+/// If it cannot be started.
+pub fn run_by(mut command: Command, directory: &Path, arguments: &[&str]) -> Finished {
+    let output = command
         .args(arguments)
         .current_dir(directory)
         .env_remove("RUST_LOG")
         .env_remove("GONIOD_URL")
         .output();
     output
-        .unwrap_or_else(|error| panic!("cannot start {program}: {error}"))
+        .unwrap_or_else(|error| panic!("cannot start {command:?}: {error}"))
         .into()
 }

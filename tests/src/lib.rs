@@ -8,7 +8,7 @@ mod service;
 mod simulator;
 
 pub use captured::{Captured, difference, entries};
-pub use finished::{Finished, run};
+pub use finished::{Finished, on_a_full_disk, run, run_by};
 pub use kills::{Tally, kills};
 pub use service::Service;
 pub use simulator::Simulator;

@@ -1,7 +1,6 @@
 //! The daemon is killed at random moments, or runs out of disk, and loses nothing.
 //! `cargo build -p tests && cargo run -p tests --bin kills -- 200` kills it 200 times.
 
-use std::process::Command;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use tests::{Captured, Service, Simulator};
@@ -24,10 +23,7 @@ fn a_full_disk_is_a_fault_and_the_run_goes_on_later() {
     let (rig, data) = (simulator.rig_file(folder.path()), folder.path().join("data"));
     let job = folder.path().join("job.toml");
     std::fs::write(&job, JOB).unwrap();
-    // A file size limit stands for a full disk: the write fails, in a process that is told so and not killed for it.
-    let mut limited = Command::new("sh");
-    limited.args(["-c", r#"trap '' XFSZ; ulimit -f 1500; exec "$0" "$@""#, DAEMON]);
-    let mut service = Service::start_by(limited, &rig, &data);
+    let mut service = Service::start_by(tests::on_a_full_disk(DAEMON, 1500), &rig, &data);
     let id = service.ask(&format!("submit {}", job.display()))["id"].clone();
     let mut told = Vec::new();
     let fault = service.until(|said| {

@@ -10,7 +10,7 @@ use std::process::{Child, Command, Stdio};
 
 use capture::{Outcome, Record};
 use rustix::process::{Pid, Signal, kill_process};
-use tests::{Captured, Finished, run};
+use tests::{Captured, Finished, on_a_full_disk, run, run_by};
 
 const GONIOCTL: &str = env!("CARGO_BIN_EXE_e2e-gonioctl");
 
@@ -170,10 +170,7 @@ fn a_second_interrupt_is_an_emergency_stop() {
 fn a_full_disk_loses_nothing() {
     let temporary = tempfile::tempdir().unwrap();
     prepare(temporary.path());
-    // A file size limit stands for a full disk: the write fails, in a process that is told so and not killed for it.
-    let limited = "trap '' XFSZ; ulimit -f 600; exec \"$0\" \"$@\"";
-    let arguments = [&["-c", limited, GONIOCTL], &RUN[..]].concat();
-    let finished = run("sh", temporary.path(), &arguments).expect(4);
+    let finished = run_by(on_a_full_disk(GONIOCTL, 600), temporary.path(), &RUN).expect(4);
     let directory = only_run(temporary.path());
     assert!(finished.stderr.contains("journal"), "{}", finished.stderr);
     let full = Captured::read(&directory);
