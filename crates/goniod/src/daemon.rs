@@ -1,5 +1,5 @@
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::SystemTime;
 
 use arms::{Arm, ArmAngle};
@@ -80,6 +80,7 @@ impl Daemon {
             command: watch::Sender::new(Command::Run),
             view: watch::Sender::new(view),
             log: Arc::new(Log::new(life * EVENTS_PER_LIFE)),
+            unkept: Mutex::default(),
             rig,
         });
         let (asks, asked) = mpsc::channel(ASKS);
@@ -145,7 +146,8 @@ impl Daemon {
     /// # Errors
     /// The store cannot be read.
     pub async fn jobs(&self) -> Result<Vec<Job>, Refusal> {
-        Ok(self.shared.store.jobs(LISTED).await?)
+        let jobs = self.shared.store.jobs(LISTED).await?;
+        Ok(jobs.into_iter().map(|job| self.shared.latest(job)).collect())
     }
 
     /// One job.
@@ -154,7 +156,8 @@ impl Daemon {
     /// There is none of that id; the store cannot be read.
     pub async fn job(&self, id: JobId) -> Result<Job, Refusal> {
         let job = self.shared.store.job(id).await?;
-        job.ok_or_else(|| Refusal::new(RefusalKind::NotFound, format!("there is no job {id}")))
+        job.map(|job| self.shared.latest(job))
+            .ok_or_else(|| Refusal::new(RefusalKind::NotFound, format!("there is no job {id}")))
     }
 
     /// Starts, gives up or goes on with a job.

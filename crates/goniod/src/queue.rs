@@ -5,7 +5,6 @@ use tokio::sync::{mpsc, oneshot};
 
 use crate::hand::Task;
 use crate::lock::Lock;
-use crate::refusal::chain;
 use crate::shared::Shared;
 use crate::state::Cause;
 use crate::{DaemonError, FaultCode, Job, JobId, JobState, Refusal, What};
@@ -192,8 +191,7 @@ impl Queue {
         });
     }
 
-    /// Changes a job's state, where the table allows it. A store that refuses is a warning: what the rig does is true
-    /// all the same, and after a restart the job counts as interrupted.
+    /// Changes a job's state, where the table allows it.
     async fn change(&mut self, id: JobId, cause: Cause, why: Option<String>) {
         let Some(job) = self.jobs.iter_mut().find(|job| job.id == id) else {
             return;
@@ -208,13 +206,7 @@ impl Queue {
         if state.over() {
             self.jobs.retain(|job| job.id != id);
         }
-        // Who hears of it and asks the store must find it there.
-        if let Err(error) = self.shared.store.change_job(&changed).await {
-            self.shared.warn(format!(
-                "the state of job {id} is not in the store: {}",
-                chain(&error)
-            ));
-        }
+        self.shared.keep(&changed).await;
         self.shared.tell(What::Job {
             job: Box::new(changed),
         });

@@ -1,5 +1,6 @@
+use std::collections::HashMap;
 use std::path::PathBuf;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
 use capture::Command;
@@ -7,7 +8,8 @@ use rig::RigFile;
 use tokio::sync::watch;
 
 use crate::event::Log;
-use crate::{Activity, FaultView, RigView, Settings, Store, What};
+use crate::refusal::chain;
+use crate::{Activity, FaultView, Job, JobId, RigView, Settings, Store, What};
 
 /// What the handles, the queue and the hand share: all of it can be read or told at once, nothing waits.
 pub(crate) struct Shared {
@@ -18,6 +20,8 @@ pub(crate) struct Shared {
     pub(crate) command: watch::Sender<Command>,
     pub(crate) view: watch::Sender<RigView>,
     pub(crate) log: Arc<Log>,
+    /// Jobs as they are, where the store refused to keep how they changed.
+    pub(crate) unkept: Mutex<HashMap<JobId, Job>>,
 }
 
 impl Shared {
@@ -41,6 +45,32 @@ impl Shared {
     pub(crate) fn warn(&self, text: String) {
         tracing::warn!("{text}");
         self.tell(What::Warning { text });
+    }
+
+    /// Keeps how a job changed. A store that refuses is a warning: what the rig does is true all the same, and after a
+    /// restart the job counts as interrupted.
+    pub(crate) async fn keep(&self, job: &Job) {
+        // Who hears of it and asks the store must find it there.
+        let kept = self.store.change_job(job).await;
+        let mut unkept = self.unkept.lock().unwrap_or_else(PoisonError::into_inner);
+        match kept {
+            Ok(()) => unkept.remove(&job.id),
+            Err(_) => unkept.insert(job.id, job.clone()),
+        };
+        drop(unkept);
+        if let Err(error) = kept {
+            self.warn(format!(
+                "the state of job {} is not in the store: {}",
+                job.id,
+                chain(&error)
+            ));
+        }
+    }
+
+    /// What the store has of a job, or how it changed since the store refuses.
+    pub(crate) fn latest(&self, job: Job) -> Job {
+        let unkept = self.unkept.lock().unwrap_or_else(PoisonError::into_inner);
+        unkept.get(&job.id).cloned().unwrap_or(job)
     }
 
     pub(crate) fn activity(&self, activity: Activity) {

@@ -96,9 +96,13 @@ async fn a_database_that_another_program_locks() {
     let fault = view.fault.expect("just seen");
     assert_eq!(fault.code, FaultCode::StoreLocked);
     assert!(fault.text.contains("locked"), "{fault:?}");
+    // The store has it as running and may not be changed; who asks is told what is.
+    idle(&daemon).await;
+    let told = daemon.job(job.id).await.unwrap();
+    assert_eq!(told.state, JobState::Interrupted);
+    assert!(told.why.is_some_and(|why| why.contains("locked")));
     sqlx::query("ROLLBACK").execute(&mut other).await.unwrap();
     other.close().await.unwrap();
-    idle(&daemon).await;
     daemon.shutdown().await;
 
     let bench = Bench {
