@@ -5,7 +5,7 @@ use crate::bisected::{Bisected, Pair};
 use crate::model::Basis;
 use crate::surface::Surface;
 use crate::sweeps::Sweeps;
-use crate::table::{exp2, logs};
+use crate::table::{LOG_MAX, exp2, logs};
 use crate::{Error, FactorTable, Model, Observation, Shape};
 
 /// Nodes over either angle.
@@ -28,7 +28,8 @@ pub struct Bivariate {
     surface: Surface,
     /// log₂ of RGB, θ_h fastest, and a number that is loaded and not used.
     logs: Vec<f32>,
-    light: DVec3,
+    /// 0 in a black channel, else 1, and a number that is not used.
+    light: Vec4,
     dropped: usize,
 }
 
@@ -55,7 +56,7 @@ impl Bivariate {
         Ok(Self {
             surface,
             logs: nodes,
-            light: sweeps.light(),
+            light: sweeps.light().as_vec3().extend(0.0),
             dropped: sweeps.dropped,
         })
     }
@@ -86,7 +87,9 @@ impl Brdf for Bivariate {
             a + (b - a) * across
         };
         let (a, b) = (near(row), near(row + 1));
-        exp2(a + (b - a) * along).truncate().as_dvec3() * self.light
+        // What is no number is dark.
+        let log = (a + (b - a) * along).max(Vec4::splat(-LOG_MAX));
+        exp2(log, self.light).truncate().as_dvec3()
     }
 }
 

@@ -1,6 +1,6 @@
 use std::f32::consts::LN_2;
 
-use glam::{DVec3, Vec3, Vec4};
+use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 
 use crate::bisected::{Bisected, Pair, RISE};
 
@@ -23,21 +23,21 @@ pub(crate) const STEPS: [f64; 3] = [
 /// Largest zenith angle of pairs on which models are judged, rad.
 pub(crate) const THETA_MAX: f64 = 80.0 * std::f64::consts::PI / 180.0;
 /// Largest |log₂ f| that is stored; 2⁻¹²⁰ is 7.5e-37 sr⁻¹.
-const LOG_MAX: f64 = 120.0;
+pub(crate) const LOG_MAX: f32 = 120.0;
 
 /// A reflectance in the plane as a small table in f32, and what makes of it one for all directions.
 ///
-/// It holds log₂ f at 55 × 24 nodes, and is linear between them. Over θ_h they stand at even steps of a logarithm of
+/// It holds log₂ f at 66 × 20 nodes, and is linear between them. Over θ_h they stand at even steps of a logarithm of
 /// 1 + tan²(θ_h/2)/k² whose mantissa is not looked up but taken as it stands, over the cosines at even steps of
 /// √(cos θ_i cos θ_o)/cos θ_h: both even about the mirror direction and about the normal, as f is, and both had from
-/// unit vectors with one division and three roots, without angles.
+/// unit vectors by a root and a quotient, without angles.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Table {
     /// log₂ of RGB, θ_h fastest, and a number that is loaded and not used.
     logs: Vec<f32>,
     axis: Axis,
-    /// 0 in a black channel, else 1.
-    light: Vec3,
+    /// 0 in a black channel, else 1, and a number that is not used.
+    light: Vec4,
 }
 
 /// The axis of half angles.
@@ -59,15 +59,11 @@ impl Axis {
         }
     }
 
-    /// In cells from the mirror direction, 0 … [`COLUMNS`] − 1, of tan²(θ_h/2) ≥ 0.
+    /// In cells from the mirror direction, 0 … [`COLUMNS`] − 1, of 1 + tan²(θ_h/2)/k².
     #[inline(always)]
-    fn place(self, tan: f32) -> f32 {
+    fn place(self, number: f32) -> f32 {
         // Signed, for which the processor has an instruction.
-        (1.0 + tan * self.inverse)
-            .to_bits()
-            .wrapping_sub(1_f32.to_bits())
-            .cast_signed() as f32
-            * self.cells
+        number.to_bits().wrapping_sub(1_f32.to_bits()).cast_signed() as f32 * self.cells
     }
 
     /// tan²(θ_h/2) of a place.
@@ -84,15 +80,38 @@ impl Axis {
 struct Places(Vec4);
 
 impl Places {
-    /// Of the sin² θ_h and cos² θ_h of both, and the product of cosines that they share.
+    /// Of two unit vectors above the horizon, and the most by which ln f may rise, as [`Pair::most`].
+    ///
+    /// With s and d the flat parts of sum and difference, h the height of the sum, p = cos θ_i cos θ_o and e the height
+    /// of the cross product: L = s² + h² is 4 cos² θ_d, and C = h² + d² is 4 (p + sin² θ_d) without cancellation. The pair
+    /// in the plane with the same half angle has tan²(θ_h/2) = s²/(√L + h)² and the row √(p L)/h, the one with the same
+    /// difference angle 4 (s² − e²)/(L (2 + √C)²) and 2 √(p/C).
     #[inline(always)]
-    fn new(axis: Axis, sin: [f32; 2], cos: [f32; 2], product: f32) -> Self {
-        // What both need of roots and quotients side by side, for the way through them is what takes the time.
-        let rows = (Vec4::new(product, product, 1.0, 1.0) / Vec4::new(cos[0], cos[1], 1.0, 1.0)).sqrt();
-        let one = Vec4::new(cos[0], cos[1], 1.0, 1.0).sqrt() + Vec4::ONE;
-        let tan = Vec4::new(sin[0], sin[1], 1.0, 1.0) / (one * one);
-        let rows = rows * (ROWS - 1) as f32;
-        Self(Vec4::new(axis.place(tan.x), axis.place(tan.y), rows.x, rows.y))
+    fn new(axis: Axis, incident: DVec3, exitant: DVec3) -> (Self, f32) {
+        // What cancels is a sum of two numbers in f64; the rest is in f32.
+        let (sum, difference) = (incident + exitant, incident - exitant);
+        let flat = (sum.x * sum.x + sum.y * sum.y) as f32;
+        let apart = (difference.x * difference.x + difference.y * difference.y) as f32;
+        let across = (incident.x * exitant.y - incident.y * exitant.x) as f32;
+        let product = (incident.z * exitant.z) as f32;
+        let height = sum.z as f32;
+        let up = height * height;
+        let (length, cos, out) = (flat + up, up + apart, across * across);
+        // The way through roots and quotients is what takes the time: one step of each, side by side. Hence the squares
+        // are multiplied out, and the 1 that an axis adds to its quotient is the denominator in the numerator.
+        let roots = Vec4::new(length, cos, product * length, product).sqrt();
+        let squares = [length + up, length * (4.0 + cos)];
+        let twice = [2.0 * height, 4.0 * length];
+        let tan = [flat * axis.inverse, (flat - out) * (4.0 * axis.inverse)];
+        const CELLS: f32 = (ROWS - 1) as f32;
+        let above = Vec4::new(squares[0] + tan[0], squares[1] + tan[1], 0.0, 0.0)
+            + Vec4::new(twice[0], twice[1], CELLS, 2.0 * CELLS) * roots;
+        let below = Vec4::new(squares[0], squares[1], height, 0.0)
+            + Vec4::new(twice[0], twice[1], 0.0, 1.0) * roots.xyxy();
+        let places = above / below;
+        let columns = [places.x, places.y].map(|number| axis.place(number));
+        let most = std::f32::consts::LOG2_E * out / (0.5 * length * length + out).max(f32::MIN_POSITIVE);
+        (Self(Vec4::new(columns[0], columns[1], places.z, places.w)), most)
     }
 
     /// The first number of the cells of both, always within the table, and how far in them both stand, as the places.
@@ -100,7 +119,7 @@ impl Places {
     fn cells(self) -> ([usize; 2], Vec4) {
         /// Adding it leaves a whole number in the last bits: cheaper than a conversion, which has to mind what is no
         /// number.
-        const WHOLE: f32 = 8_388_608.0;
+        const WHOLE: f32 = 12_582_912.0;
         /// Just below the last node.
         const LAST: Vec4 = Vec4::new(
             (COLUMNS - 1) as f32 - 1e-4,
@@ -108,9 +127,10 @@ impl Places {
             (ROWS - 1) as f32 - 1e-4,
             (ROWS - 1) as f32 - 1e-4,
         );
-        // What is no number becomes 0.
+        // What is no number becomes 0: 0/0, where there is no half vector.
         let places = self.0.max(Vec4::ZERO).min(LAST);
-        let shifted = (places - Vec4::splat(0.5)).max(Vec4::ZERO) + Vec4::splat(WHOLE);
+        // Of −1/2 it makes 0, for ties go to the even number.
+        let shifted = places - Vec4::splat(0.5) + Vec4::splat(WHOLE);
         let [a, b, c, d] = shifted.to_array().map(|s| (s.to_bits() & 0x7f) as usize);
         (
             [c * STRIDE + 3 * a, d * STRIDE + 3 * b],
@@ -149,7 +169,7 @@ impl Table {
         Self {
             logs,
             axis,
-            light: light.as_vec3(),
+            light: light.as_vec3().extend(0.0),
         }
     }
 
@@ -177,7 +197,7 @@ impl Table {
             let node_shift = sum * (0.5 / cells);
             node.iter_mut()
                 .zip(node_shift.to_array())
-                .for_each(|(log, shift)| *log += shift);
+                .for_each(|(log, shift)| *log = bounded(*log + shift));
         }
         self
     }
@@ -197,43 +217,27 @@ impl Table {
     #[inline(always)]
     fn at(&self, first: usize, across: f32, along: f32) -> Vec4 {
         let corners = &self.logs[first..first + STRIDE + 7];
-        let near = |at: usize| {
+        // Two products at once are done sooner than a difference and its product.
+        let row = |at: usize| {
             let a = Vec4::from_slice(&corners[at..at + 4]);
             let b = Vec4::from_slice(&corners[at + 3..at + 7]);
-            a + (b - a) * across
+            a * (1.0 - across) + b * across
         };
-        let (a, b) = (near(0), near(STRIDE));
-        a + (b - a) * along
+        row(0) * (1.0 - along) + row(STRIDE) * along
     }
 
     /// The reflectance of two unit vectors above the horizon, as [`Pair`] has it, the angles and all that follows in
     /// f32: the sums and differences of which they are made are not, and lose nothing.
     #[inline]
     pub(crate) fn reflectance(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
-        let (sum, difference) = (incident + exitant, incident - exitant);
-        let across = (incident.x * exitant.y - incident.y * exitant.x) as f32;
-        let flat = (sum.x * sum.x + sum.y * sum.y) as f32;
-        let up = (sum.z * sum.z) as f32;
-        let sin_d = 0.25 * difference.length_squared() as f32;
-        let product = (incident.z * exitant.z) as f32;
-        // Opposite at the horizon there is no half vector.
-        let length = (flat + up).max(f32::MIN_POSITIVE);
-        let inverse = 1.0 / length;
-        let (sin_h, out) = (flat * inverse, across * across * inverse);
-        let places = Places::new(
-            self.axis,
-            [sin_h, sin_h - out],
-            [up * inverse, product + sin_d],
-            product,
-        );
+        let (places, most) = Places::new(self.axis, incident, exitant);
         let (cells, within) = places.cells();
         let near = self.at(cells[0], within.x, within.z);
         let far = self.at(cells[1], within.y, within.w);
-        let most = std::f32::consts::LOG2_E * out / (0.5 * length + out);
         let rise = ((far - near) * RISE as f32)
             .max(Vec4::ZERO)
             .min(Vec4::splat(most));
-        (exp2(near + rise).truncate() * self.light).as_dvec3()
+        exp2(near + rise, self.light).truncate().as_dvec3()
     }
 
     /// Numbers that it consists of.
@@ -254,12 +258,11 @@ fn pose(axis: Axis, column: f64, row: f64) -> Bisected {
     }
 }
 
-/// 2ˣ to 2e-7 of itself for |x| ≤ 126, in all lanes at once; finite for every x.
+/// 2ˣ times a factor to 2e-7 of itself for |x| ≤ 126, in all lanes at once.
 #[inline(always)]
-pub(crate) fn exp2(x: Vec4) -> Vec4 {
-    /// Adding it leaves a whole number in the last bits.
-    const WHOLE: f32 = 12_582_912.0;
-    let x = x.max(Vec4::splat(-126.0)).min(Vec4::splat(126.0));
+pub(crate) fn exp2(x: Vec4, factor: Vec4) -> Vec4 {
+    /// Adding it leaves a whole number in the last bits, and the bias of an exponent.
+    const WHOLE: f32 = 12_582_912.0 + 127.0;
     let shifted = x + Vec4::splat(WHOLE);
     let t = x - (shifted - Vec4::splat(WHOLE));
     // Taylor of 2ᵗ for |t| ≤ 1/2, in pairs.
@@ -268,15 +271,18 @@ pub(crate) fn exp2(x: Vec4) -> Vec4 {
     let low = pair(1.0, LN_2) + square * pair(LN_2 * LN_2 / 2.0, LN_2 * LN_2 * LN_2 / 6.0);
     let high = pair(0.009_618_129, 0.001_333_355_8) + square * 0.000_154_035_3;
     let sum = low + square * square * high;
-    let power = shifted
-        .to_array()
-        .map(|s| f32::from_bits((s.to_bits() << 23).wrapping_add(1_f32.to_bits())));
-    sum * Vec4::from_array(power)
+    let power = shifted.to_array().map(|s| f32::from_bits(s.to_bits() << 23));
+    sum * (Vec4::from_array(power) * factor)
 }
 
 /// log₂ of RGB as it is stored.
 pub(crate) fn logs(rgb: DVec3) -> Vec3 {
-    Vec3::from_array(rgb.to_array().map(|f| f.log2().clamp(-LOG_MAX, LOG_MAX) as f32))
+    rgb.map(f64::log2).as_vec3().map(bounded)
+}
+
+/// A logarithm as it is stored: its power of 2 is a number that f32 has all digits of.
+fn bounded(log: f32) -> f32 {
+    log.clamp(-LOG_MAX, LOG_MAX)
 }
 
 /// Pairs of directions even in angle below 80°, as pairs in the plane; always the same.
