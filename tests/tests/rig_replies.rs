@@ -19,6 +19,10 @@ const SENSOR: u8 = 2;
 /// A status packet's header up to its id.
 const HEADER: [u8; 4] = [0xFF, 0xFF, 0xFD, 0x00];
 
+/// Instruction of a status packet, and the error number of a register that may not be accessed (e-manual, Protocol 2.0).
+const STATUS: u8 = 0x55;
+const ACCESS_ERROR: u8 = 0x07;
+
 /// A rig in front of the simulated bus, at whose terminal `tamper` stands: it gets the id that a request is for and the
 /// replies to it, and says what the host hears instead.
 fn tampered(mut tamper: impl FnMut(u8, Vec<u8>) -> Vec<u8> + Send + 'static) -> Dynamixel {
@@ -71,6 +75,49 @@ async fn a_late_reply_of_another_device_is_passed_over() {
     let wrong = location(&mut rig, Arm::Light).await.unwrap_err();
     assert!(matches!(wrong, RigError::BadReply { .. }), "{wrong:?}");
     assert!(wrong.to_string().contains("id 2 answered instead"), "{wrong}");
+}
+
+/// The packet library tells of a refusal without its sender.
+#[tokio::test]
+async fn a_late_refusal_of_another_device_is_passed_over() {
+    let refusal = |id: u8| {
+        let bytes = [&HEADER[..], &[id, 4, 0, STATUS, ACCESS_ERROR]].concat();
+        let crc = crc(&bytes);
+        [&bytes[..], &crc.to_le_bytes()].concat()
+    };
+    let mut answered = false;
+    let mut rig = tampered(move |id, reply| match id {
+        // The sensor's first reply is late.
+        SENSOR if !answered => {
+            answered = true;
+            Vec::new()
+        }
+        LIGHT => [refusal(SENSOR), reply].concat(),
+        _ => reply,
+    });
+    let lost = location(&mut rig, Arm::Sensor).await.unwrap_err();
+    assert!(matches!(lost, RigError::NoReply { id: SENSOR, .. }), "{lost:?}");
+    let light = location(&mut rig, Arm::Light).await.unwrap();
+    assert!((light.deg() + 45.0).abs() < 0.2, "{}°", light.deg());
+
+    // Once the sensor has caught up it owes nothing: then such a refusal is damage, and not the light arm's.
+    location(&mut rig, Arm::Sensor).await.unwrap();
+    let wrong = location(&mut rig, Arm::Light).await.unwrap_err();
+    assert!(matches!(wrong, RigError::BadReply { .. }), "{wrong:?}");
+    assert!(wrong.to_string().contains("id 2 answered instead"), "{wrong}");
+
+    // The light arm's own refusal is one.
+    let mut rig = tampered(move |_, _| refusal(LIGHT));
+    let refused = location(&mut rig, Arm::Light).await.unwrap_err();
+    let own = matches!(
+        refused,
+        RigError::Refused {
+            id: LIGHT,
+            number: ACCESS_ERROR,
+            ..
+        }
+    );
+    assert!(own, "{refused:?}");
 }
 
 #[tokio::test]

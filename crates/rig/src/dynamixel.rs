@@ -3,6 +3,7 @@
 //! Built on `dynamixel2` with defences; docs/adr/0001-dynamixel2-with-defences.md says which and why.
 
 mod block;
+mod buffer;
 mod bus;
 mod census;
 mod line;

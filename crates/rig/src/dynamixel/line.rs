@@ -2,11 +2,14 @@ use std::collections::BTreeSet;
 use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::{Duration, Instant};
 
 use dynamixel2::{Bus, ReadError, WriteError};
 use serialport::TTYPort;
 
+use super::buffer::{BUFFER, Received};
 use super::node::BROADCAST;
 use super::port;
 use crate::{BusSettings, RigError};
@@ -26,9 +29,6 @@ const INSTRUCTION_OVERHEAD: usize = 10;
 
 /// Bytes of a status packet besides its parameters: those of an instruction and the error byte.
 const STATUS_OVERHEAD: usize = 11;
-
-/// Bytes of the packet buffers: several times the longest packet that is sent or asked for.
-const BUFFER: usize = 256;
 
 /// Ping (e-manual, Protocol 2.0).
 const PING: u8 = 0x01;
@@ -68,6 +68,9 @@ pub(super) struct Reply {
     pub(super) parameters: Vec<u8>,
 }
 
+/// A status packet: whose it is, and its reply or its error number.
+type Status = (u8, Result<Reply, u8>);
+
 /// Ids that answered, and what they said.
 pub(super) type Answers = Vec<(u8, Vec<u8>)>;
 
@@ -93,7 +96,9 @@ pub(super) enum Cause {
 /// The port, locked, with `dynamixel2` on it. Owned by one thread; one transaction at a time.
 pub(super) struct Line {
     // Declared first, so that it is closed before the lock is given up.
-    bus: Bus<Vec<u8>, Vec<u8>>,
+    bus: Bus<Received, Vec<u8>>,
+    /// Id of the device whose status packet came last.
+    sender: Arc<AtomicU8>,
     echo: Option<serial2::SerialPort>,
     lock: TTYPort,
     path: PathBuf,
@@ -111,8 +116,10 @@ impl Line {
             port: path.to_owned(),
             source,
         };
+        let sender = Arc::default();
         Ok(Self {
-            bus: bus(&lock).map_err(unusable)?,
+            bus: bus(&lock, &sender).map_err(unusable)?,
+            sender,
             echo: echo(&lock, settings).map_err(unusable)?,
             lock,
             path: path.to_owned(),
@@ -133,7 +140,7 @@ impl Line {
         let first = request.replies.first().map_or(request.id, |&(id, _)| id);
         let started = Instant::now();
         let result = catch_unwind(AssertUnwindSafe(|| self.attempt(request))).unwrap_or_else(|_| {
-            let cause = match bus(&self.lock) {
+            let cause = match bus(&self.lock, &self.sender) {
                 Ok(bus) => {
                     self.bus = bus;
                     Cause::Damage("it has an impossible length".to_owned())
@@ -170,20 +177,22 @@ impl Line {
         })?;
         let mut replies = Vec::with_capacity(request.replies.len());
         for &(id, count) in &request.replies {
-            let (answered, reply) = self
+            let (answered, said) = self
                 .receive_fresh(deadline)
                 .map_err(|cause| Failure { id, cause })?;
-            let found = reply.parameters.len();
-            let cause = if answered == id && found == count {
-                replies.push(reply);
-                continue;
-            } else if answered == id {
-                Cause::Damage(format!("it has {found} bytes instead of {count}"))
-            } else if request.replies.iter().any(|&(other, _)| other == answered) {
+            let cause = match said {
+                Ok(reply) if answered == id && reply.parameters.len() == count => {
+                    replies.push(reply);
+                    continue;
+                }
+                Ok(reply) if answered == id => {
+                    let found = reply.parameters.len();
+                    Cause::Damage(format!("it has {found} bytes instead of {count}"))
+                }
+                Err(number) if answered == id => Cause::Refusal(number),
                 // The next device of a bulk read spoke up: this one has missed its turn.
-                Cause::Silence
-            } else {
-                stranger(answered)
+                _ if request.replies.iter().any(|&(other, _)| other == answered) => Cause::Silence,
+                _ => stranger(answered),
             };
             return Err(Failure { id, cause });
         }
@@ -201,25 +210,24 @@ impl Line {
         };
         let deadline = self.send(&ping)?;
         loop {
-            match self.receive(deadline) {
-                Ok((answered, reply)) if answered == id && reply.parameters.len() == PING_REPLY => {
+            // Damage is not passed over: of a reply that claims to be too long, the crate tells again and again.
+            match self.receive(deadline)? {
+                (answered, Ok(reply)) if answered == id && reply.parameters.len() == PING_REPLY => {
                     return Ok(());
                 }
-                Ok((answered, _)) if !self.suspects.contains(&answered) => return Err(stranger(answered)),
-                Ok(_) | Err(Cause::Refusal(_)) => {}
-                // Not passed over: of a reply that claims to be too long, the crate tells again and again.
-                Err(cause) => return Err(cause),
+                (answered, _) if !self.suspects.contains(&answered) => return Err(stranger(answered)),
+                _ => {}
             }
         }
     }
 
     /// The next status packet of a device that owes none. Those whom the request in hand asks have caught up; what a
     /// suspect says now answers an earlier request, late, and is passed over.
-    fn receive_fresh(&mut self, deadline: Instant) -> Result<(u8, Reply), Cause> {
+    fn receive_fresh(&mut self, deadline: Instant) -> Result<Status, Cause> {
         loop {
-            let (answered, reply) = self.receive(deadline)?;
+            let (answered, said) = self.receive(deadline)?;
             if !self.suspects.contains(&answered) {
-                return Ok((answered, reply));
+                return Ok((answered, said));
             }
             tracing::debug!(id = answered, "late reply passed over");
         }
@@ -242,7 +250,7 @@ impl Line {
         while damaged < DAMAGED_MAX {
             // The crate panics on an impossible length, see `transact`.
             match catch_unwind(AssertUnwindSafe(|| self.receive(deadline))) {
-                Ok(Ok((id, reply))) if reply.parameters.len() == PING_REPLY => {
+                Ok(Ok((id, Ok(reply)))) if reply.parameters.len() == PING_REPLY => {
                     answers.push((id, reply.parameters));
                 }
                 Ok(Err(Cause::Silence)) => break,
@@ -273,17 +281,22 @@ impl Line {
         Ok(deadline)
     }
 
-    /// The next status packet, and whose it is.
-    fn receive(&mut self, deadline: Instant) -> Result<(u8, Reply), Cause> {
-        let status = self
-            .bus
-            .read_status_response_deadline(deadline)
-            .map_err(read_cause)?;
-        let reply = Reply {
-            alert: status.alert(),
-            parameters: status.parameters().to_owned(),
-        };
-        Ok((status.packet_id(), reply))
+    /// The next status packet.
+    fn receive(&mut self, deadline: Instant) -> Result<Status, Cause> {
+        match self.bus.read_status_response_deadline(deadline) {
+            Ok(status) => {
+                let reply = Reply {
+                    alert: status.alert(),
+                    parameters: status.parameters().to_owned(),
+                };
+                Ok((status.packet_id(), Ok(reply)))
+            }
+            Err(ReadError::MotorError(error)) => {
+                Ok((self.sender.load(Ordering::Relaxed), Err(error.error_number())))
+            }
+            Err(ReadError::Io(error)) => Err(io_cause(error)),
+            Err(error) => Err(Cause::Damage(error.to_string())),
+        }
     }
 
     /// Longest time until all replies are there: bytes both ways, return delays, adapter, host.
@@ -301,8 +314,9 @@ fn stranger(id: u8) -> Cause {
     Cause::Damage(format!("id {id} answered instead"))
 }
 
-fn bus(lock: &TTYPort) -> Result<Bus<Vec<u8>, Vec<u8>>, serialport::Error> {
-    Bus::with_buffers(port::descriptor(lock)?, vec![0; BUFFER], vec![0; BUFFER])
+fn bus(lock: &TTYPort, sender: &Arc<AtomicU8>) -> Result<Bus<Received, Vec<u8>>, serialport::Error> {
+    let received = Received::new(Arc::clone(sender));
+    Bus::with_buffers(port::descriptor(lock)?, received, vec![0; BUFFER])
         .map_err(|error| serialport::Error::new(serialport::ErrorKind::Unknown, error.to_string()))
 }
 
@@ -344,13 +358,5 @@ fn write_cause(error: WriteError) -> Cause {
         WriteError::DiscardBuffer(error) | WriteError::Write(error) => io_cause(error),
         // Cannot happen: no packet comes near the size of the buffer.
         error @ WriteError::BufferTooSmall(_) => Cause::Damage(error.to_string()),
-    }
-}
-
-fn read_cause(error: ReadError) -> Cause {
-    match error {
-        ReadError::Io(error) => io_cause(error),
-        ReadError::MotorError(error) => Cause::Refusal(error.error_number()),
-        error @ (ReadError::BufferFull(_) | ReadError::InvalidMessage(_)) => Cause::Damage(error.to_string()),
     }
 }
