@@ -399,8 +399,10 @@ mod tests {
             enough in 0_u32..1_048_575,
         ) {
             let max_us = min_us.saturating_mul(span).min(10_000_000);
+            // The monitor must have room for the longest of all integrations, 10 s.
             let file = rig(&format!(
-                "integration_min_us = {min_us}\nintegration_max_us = {max_us}\naim = {aim}\nenough = {enough}"
+                "integration_min_us = {min_us}\nintegration_max_us = {max_us}\naim = {aim}\nenough = {enough}\n\
+                 [calibration]\nmonitor = 0.1"
             ));
             let p = &file.photometer;
             let ranging = with_darks(&file);

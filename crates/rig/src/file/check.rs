@@ -12,7 +12,7 @@ use crate::axis::{
     VELOCITY_UNIT_RAD_S,
 };
 use crate::dynamixel::{BAUD_RATES, MODELS};
-use crate::{Axis, RigError};
+use crate::{Axis, Lamp, RigError};
 
 mod calibration;
 mod suspend;
@@ -34,6 +34,18 @@ pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
         can_pass: raw.envelope.can_pass,
     };
     let photometer = photometer(source, &raw.photometer)?;
+    let calibration = calibration::constants(source, &raw.calibration)?;
+    let visits = calibration::visits(source, &raw.calibration, &envelope)?;
+    // Where nothing else follows the lamp, every reading counts on the monitor.
+    let monitored_us = f64::from(photometer.full_scale) / calibration.monitor;
+    if visits.lamp == Lamp::Monitor && f64::from(photometer.integration_max_us) >= monitored_us {
+        return Err(source.refuse(
+            "photometer.integration_max_us",
+            &raw.photometer.integration_max_us,
+            photometer.integration_max_us,
+            format!("below {monitored_us:.0}, where the lamp monitor is full (calibration.monitor)"),
+        ));
+    }
     for (key, id, others) in [
         ("sensor.id", &raw.sensor.id, vec![light.id]),
         ("photometer.id", &raw.photometer.id, vec![light.id, sensor.id]),
@@ -47,8 +59,8 @@ pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
         arms: [light, sensor],
         motion: motion(source, &raw.motion, &envelope)?,
         photometer,
-        calibration: calibration::constants(source, &raw.calibration)?,
-        visits: calibration::visits(source, &raw.calibration, &envelope)?,
+        calibration,
+        visits,
         certificates: calibration::certificates(source, &raw.calibration)?,
         suspend: suspend::suspend(source, &raw.suspend)?,
         uncertainty: calibration::uncertainty(source, &raw.uncertainty)?,

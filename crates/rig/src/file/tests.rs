@@ -131,6 +131,10 @@ fn errors_say_where_and_what_is_allowed() {
             "bench.toml, line 3: photometer.integration_max_us is 400, allowed: 500 … 10000000",
         ),
         (
+            "[photometer]\nintegration_max_us = 300000",
+            "bench.toml, line 2: photometer.integration_max_us is 300000, allowed: below 209715, where the lamp monitor is full (calibration.monitor)",
+        ),
+        (
             "[calibration]\nresponsivity = [1.0, 0.0, 1.0]",
             "bench.toml, line 2: calibration.responsivity is [1.0, 0.0, 1.0], allowed: three finite values > 0",
         ),
@@ -200,7 +204,7 @@ fn the_fingerprint_follows_what_a_calibration_depends_on() {
     }
     for other in [
         "[light]\nzero_deg = 181",
-        "[photometer]\nfull_scale = 65535\nenough = 100",
+        "[photometer]\nfull_scale = 1000000",
         "[calibration]\nfilling = \"under\"",
         "[calibration]\nmonitor = 5.1",
     ] {
