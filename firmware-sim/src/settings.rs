@@ -126,7 +126,7 @@ impl Settings {
             .map_err(|source| SimError::Start { source })?;
         Ok(Self {
             seed: within("seed", raw.seed, 1, 0..=i64::MAX)?.unsigned_abs(),
-            boot: ms("boot_ms", raw.boot_ms, 500.0, 10_000.0)?,
+            boot: ms("boot_ms", raw.boot_ms, Duration::from_millis(500), 10_000.0)?,
             ambient_c: within("ambient_c", raw.ambient_c, 23.0, 0.0..=60.0)?,
             imperfections: imperfections(&raw)?,
             clock: raw.clock.unwrap_or(Clock::Wire),
@@ -162,7 +162,7 @@ fn imperfections(raw: &Raw) -> Result<Imperfections, SimError> {
         lamp_warm_up: ms(
             "lamp_warm_up_ms",
             raw.lamp_warm_up_ms,
-            base.lamp_warm_up.as_secs_f64() * 1e3,
+            base.lamp_warm_up,
             60_000.0,
         )?,
         lamp_drift: read!(amount lamp_drift to 0.5),
@@ -174,12 +174,12 @@ fn imperfections(raw: &Raw) -> Result<Imperfections, SimError> {
         following_lag: ms(
             "following_lag_ms",
             raw.following_lag_ms,
-            base.following_lag.as_secs_f64() * 1e3,
+            base.following_lag,
             500.0,
         )?,
         responsivity_error: read!(signed responsivity_error to 0.5),
         gain_error: read!(signed gain_error to 0.5),
-        nonlinearity: read!(amount nonlinearity to 0.1),
+        nonlinearity: read!(amount nonlinearity to 0.2),
         crosstalk: read!(amount crosstalk to 0.5),
         lamp_trend_per_h: read!(signed lamp_trend_per_h to 0.5),
         light_zero_deg: read!(signed light_zero_deg to 5.0),
@@ -205,8 +205,8 @@ fn within<T: PartialOrd + Display>(
     })
 }
 
-fn ms(key: &'static str, value: Option<f64>, default: f64, max: f64) -> Result<Duration, SimError> {
-    within(key, value, default, 0.0..=max).map(|ms| Duration::from_secs_f64(ms / 1e3))
+fn ms(key: &'static str, value: Option<f64>, default: Duration, max: f64) -> Result<Duration, SimError> {
+    within(key, value, default.as_secs_f64() * 1e3, 0.0..=max).map(|ms| Duration::from_secs_f64(ms / 1e3))
 }
 
 #[cfg(test)]

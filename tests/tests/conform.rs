@@ -77,14 +77,15 @@ fn the_simulator_passes_and_is_left_at_rest() {
 #[test]
 fn a_bent_photometer_is_told_from_a_straight_one() {
     for specimen in ["gold-paint", "lambert:0.5"] {
-        for (lost, expected) in [(0.0, "ok"), (0.05, "warn")] {
+        for (lost, expected, code) in [(0.0, "ok", 0), (0.05, "warn", 0), (0.2, "fail", 3)] {
             let simulator = Simulator::new(&format!(
                 "[sim]\nspecimen = \"{specimen}\"\nnonlinearity = {lost}\n"
             ));
-            let (_, findings) = suite(&simulator);
+            let (exit, findings) = suite(&simulator);
             let found = findings.iter().find(|finding| finding["check"] == "linearity");
             println!("{specimen}, {lost} lost at full scale: {found:?}");
             assert_eq!(verdict(&findings, "linearity"), expected, "{specimen}, {lost}");
+            assert_eq!(exit, code, "{specimen}, {lost}: {findings:#?}");
         }
     }
 }

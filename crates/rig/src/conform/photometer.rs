@@ -1,6 +1,6 @@
 use super::Result;
 use crate::doctor::Finding;
-use crate::{Counts, Drive, Dynamixel, Exposure, Gain};
+use crate::{Counts, Drive, Dynamixel, Exposure, Gain, PhotometerSettings};
 
 /// Dark readings at each gain.
 const READINGS: usize = 16;
@@ -57,19 +57,24 @@ const DIM: f64 = 0.4;
 /// Times that the exposures are gone through: the lamp wobbles by some thousandths, and takes seconds for it.
 const LADDERS: u32 = 32;
 
+/// Name of the check.
+const LINEARITY: &str = "linearity";
+
 /// Whether the counts of every channel grow in proportion to the integration time; the lamp is on.
 pub(super) async fn linearity(drive: &mut Drive<Dynamixel>) -> Result<Finding> {
-    const CHECK: &str = "linearity";
     let settings = drive.file().photometer.clone();
     drive.wait(settings.lamp_warm_up).await?;
-    let Exposure {
-        integration_us: longest_us,
-        gain,
-    } = filling(drive).await?;
+    let longest = filling(drive, &settings).await?;
+    let taken = ladders(drive, longest, settings.integration_min_us).await?;
+    Ok(judge(&taken, longest.gain, settings.full_scale))
+}
+
+/// Means of exposures from `longest` down, shortest first; none is shorter than `shortest_us`.
+async fn ladders(drive: &mut Drive<Dynamixel>, longest: Exposure, shortest_us: u32) -> Result<Vec<Mean>> {
     let mut taken: Vec<Mean> = (0..DOUBLINGS)
         .rev()
-        .map(|halving| longest_us >> halving)
-        .filter(|&integration_us| integration_us >= settings.integration_min_us)
+        .map(|halving| longest.integration_us >> halving)
+        .filter(|&integration_us| integration_us >= shortest_us)
         .map(|integration_us| Mean {
             integration_us,
             counts: [0.0; 4],
@@ -77,37 +82,41 @@ pub(super) async fn linearity(drive: &mut Drive<Dynamixel>) -> Result<Finding> {
         .collect();
     for _ in 0..LADDERS {
         for mean in &mut taken {
-            let integration_us = mean.integration_us;
-            let counts = channels(&drive.expose(Exposure { integration_us, gain }).await?);
+            let exposure = Exposure {
+                integration_us: mean.integration_us,
+                ..longest
+            };
+            let counts = channels(&drive.expose(exposure).await?);
             for (sum, counts) in mean.counts.iter_mut().zip(counts) {
                 *sum += counts / f64::from(LADDERS);
             }
         }
     }
+    Ok(taken)
+}
+
+/// The verdict on exposures, shortest first.
+fn judge(taken: &[Mean], gain: Gain, full_scale: u32) -> Finding {
     let [Some(first), Some(last)] = [taken.first(), taken.last()] else {
-        return Ok(Finding::warn(
-            CHECK,
-            "no exposure fits the range",
-            "correct [photometer]",
-        ));
+        return Finding::warn(LINEARITY, "no exposure fits the range", "correct [photometer]");
     };
     let light = brightest(&last.counts);
-    let share = light / f64::from(settings.full_scale);
+    let share = light / f64::from(full_scale);
     if share < DIM {
-        return Ok(Finding::warn(
-            CHECK,
+        return Finding::warn(
+            LINEARITY,
             format!(
                 "not looked at: the longest exposure fills {:.1} % of the range",
                 100.0 * share
             ),
             "a brighter specimen or lamp, or a larger photometer.integration_max_us",
-        ));
+        );
     }
     // A faint colour is noisier, and does not reach to where it would bend.
     let telling = |&channel: &usize| channel == MONITOR || last.counts[channel] >= light / 2.0;
     let worst = (0..=MONITOR)
         .filter(telling)
-        .map(|channel| bend(&taken, channel))
+        .map(|channel| bend(taken, channel))
         .fold(0.0, f64::max);
     let text = format!(
         "over {} … {} µs at gain ×{}, at most {:.2} % off proportion",
@@ -116,27 +125,26 @@ pub(super) async fn linearity(drive: &mut Drive<Dynamixel>) -> Result<Finding> {
         gain.factor(),
         100.0 * worst
     );
-    Ok(if worst <= BENT {
-        Finding::ok(CHECK, text)
+    if worst <= BENT {
+        Finding::ok(LINEARITY, text)
     } else if worst <= BROKEN {
         Finding::warn(
-            CHECK,
+            LINEARITY,
             text,
             "calibrate the linearity, or use less of the range (photometer.aim)",
         )
     } else {
         Finding::fail(
-            CHECK,
+            LINEARITY,
             text,
             "the lamp flickers, the photometer saturates, or the integration times are not true",
         )
-    })
+    }
 }
 
 /// The exposure that fills the range of the brightest colour: at the weakest gain at which the longest one does, at the
 /// strongest where none does.
-async fn filling(drive: &mut Drive<Dynamixel>) -> Result<Exposure> {
-    let settings = drive.file().photometer.clone();
+async fn filling(drive: &mut Drive<Dynamixel>, settings: &PhotometerSettings) -> Result<Exposure> {
     let full = FULL * f64::from(settings.full_scale);
     let mut exposure = Exposure {
         integration_us: settings.integration_max_us,
