@@ -239,6 +239,63 @@ async fn what_saturates_in_flight_is_taken_again_at_rest() {
     }
 }
 
+/// Standard deviation of a reading's brightest channel, relative to it, by what the rig file knows of the photometer.
+fn noise_rel(scene: &Scene, of: &Reading) -> f64 {
+    let brightest = |reading: &Reading| f64::from(reading.counts.rgb.into_iter().fold(0, u32::max));
+    let exposure = of.counts.exposure;
+    let accepted = scene.journal.accepted();
+    let alike = accepted
+        .iter()
+        .filter(|dark| !dark.lamp && dark.counts.exposure.gain == exposure.gain);
+    let dark = alike.min_by_key(|dark| {
+        dark.counts
+            .exposure
+            .integration_us
+            .abs_diff(exposure.integration_us)
+    });
+    let net = (brightest(of) - brightest(dark.expect("each gain has dark readings"))).max(1.0);
+    let known = &scene.drive.file().uncertainty;
+    known.variance(net, exposure.gain.factor()).sqrt() / net
+}
+
+/// Where poses are far apart, the flank of a lobe lies between two of them, and the arms fly on with the exposure that was
+/// right for its peak.
+#[tokio::test(start_paused = true)]
+async fn what_is_far_too_faint_in_flight_is_taken_again_at_rest() {
+    const FEW: &str =
+        "[[plane]]\ntheta_r_deg = 60\nreadings = 8\n[arc]\nreadings = 6\n[sweep]\nmode = \"fly\"";
+    for specimen in ["chrome", "nickel"] {
+        let mut scene = Scene::new(FEW, &format!("specimen = \"{specimen}\"")).await;
+        assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+        assert_each_once(&scene);
+        let accepted = scene.journal.accepted();
+        let readings = scene.journal.readings();
+        let faint = readings.iter().filter(|reading| {
+            let flawed = reading.counts.saturated || reading.flags.contains(&Flag::Blurred);
+            reading.swept_rad.is_some() && !reading.accepted && !flawed
+        });
+        let allowed_rel = scene.drive.file().photometer.flight_noise_rel;
+        let mut again = 0;
+        for reading in faint {
+            let kept = accepted.iter().find(|kept| kept.step == reading.step);
+            let kept = kept.expect("every step has a reading that counts");
+            let [noise, left] = [reading, kept].map(|reading| noise_rel(&scene, reading));
+            println!(
+                "{specimen}, step {}: noise {noise:.4}, at rest {left:.4}",
+                reading.step
+            );
+            assert_eq!(kept.swept_rad, None, "{kept:?}");
+            assert!(
+                noise > 4.0 * allowed_rel,
+                "{noise} was not too faint: {reading:?}"
+            );
+            assert!(left < noise / 2.0, "{noise} became {left}: {kept:?}");
+            again += 1;
+        }
+        assert!(again > 0, "{specimen}: nothing was too faint in flight");
+    }
+}
+
 /// Chrome is some ten thousand times as bright where its arc begins as where its plane does.
 #[tokio::test(start_paused = true)]
 async fn the_first_of_each_sweep_is_ranged_at_rest() {
