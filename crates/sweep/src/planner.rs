@@ -381,10 +381,10 @@ impl<'a> Draft<'a> {
 
     /// A sweep in flight, there and back; left out where no safe way leads to it.
     fn fly(&mut self, job: &str, targets: &mut Targets, mut poses: Vec<Pose>) -> Result<(), SweepError> {
-        for _ in 0..2 {
+        for first in [true, false] {
             self.upkeep(job)?;
             let way = route(self.mechanics, self.standing, poses[0]);
-            let (Some(route), Some(seconds)) = (way, pass(self.mechanics, &poses)) else {
+            let (Some(route), Some(seconds)) = (way, self.pass_s(&poses, first)) else {
                 targets.left_out.push(LeftOut {
                     what: format!("{}, a pass of {} poses", targets.sweep, poses.len()),
                     why: "no safe way leads there from the pose before".to_owned(),
@@ -411,6 +411,23 @@ impl<'a> Draft<'a> {
             poses.reverse();
         }
         Ok(())
+    }
+
+    /// Seconds from each pose of a pass to the next, with the reading that the first pass of a sweep begins with at rest:
+    /// nothing tells before how bright it is there. The arms then rest once more, at the second pose.
+    fn pass_s(&self, poses: &[Pose], first: bool) -> Option<Vec<f64>> {
+        let seconds = pass(self.mechanics, poses)?;
+        // Of three poses the other two are not worth a pass, but flown all the same.
+        let Some(flown) = pass(self.mechanics, &poses[1..]).filter(|_| first) else {
+            return Some(seconds);
+        };
+        let mut seconds = [
+            &[self.mechanics.integration_s() + self.mechanics.transaction_s],
+            &flown[..],
+        ]
+        .concat();
+        seconds[1] += self.mechanics.leg_s(poses[0], poses[1]) + self.mechanics.settle_s;
+        Some(seconds)
     }
 
     fn push(
