@@ -60,6 +60,12 @@ impl Scene {
         self.cells.iter().any(|cell| cell.holds(theta_i, theta_o))
     }
 
+    /// The largest zenith angle of any light or viewer in it, rad.
+    pub fn reach(&self) -> f64 {
+        let farthest = |cell: &Cell| cell.theta_i[1].max(cell.theta_o[1]);
+        self.cells.iter().map(farthest).fold(0.0, f64::max)
+    }
+
     /// The cells as far as they reach below a zenith angle, rad; as they are where none does.
     pub(crate) fn below(&self, theta_max: f64) -> Vec<Cell> {
         let cut = |[low, high]: [f64; 2]| [low, high.min(theta_max)];

@@ -3,6 +3,7 @@ use std::ops::{Range, RangeInclusive};
 use serde::Deserialize;
 use toml::Spanned;
 
+use crate::first::first;
 use crate::{Arc, Distribution, Job, Mode, Model, Plane, SweepError};
 
 mod scene;
@@ -50,6 +51,31 @@ struct RawPlane {
 struct RawArc {
     readings: Spanned<i64>,
     offset: Option<Spanned<f64>>,
+}
+
+impl RawPlane {
+    fn check(&self, index: usize, source: &Source<'_>) -> Result<Plane, SweepError> {
+        let key = |name: &str| format!("plane[{index}].{name}");
+        let theta_r_deg = source.within(&self.theta_r_deg, key("theta_r_deg"), &THETA_R_DEG)?;
+        Ok(Plane {
+            theta_r: theta_r_deg.to_radians(),
+            readings: source.readings(&self.readings, key("readings"))?,
+            distribution: self.distribution,
+        })
+    }
+}
+
+impl RawArc {
+    fn check(&self, source: &Source<'_>) -> Result<Arc, SweepError> {
+        let offset = self.offset.as_ref();
+        let offset = offset
+            .map(|offset| source.within(offset, "arc.offset", &OFFSET))
+            .transpose()?;
+        Ok(Arc {
+            readings: source.readings(&self.readings, "arc.readings")?,
+            offset: offset.unwrap_or(0.0),
+        })
+    }
 }
 
 #[derive(Deserialize, Default)]
@@ -128,56 +154,49 @@ impl Job {
     /// Reads the text of a job file; `name` is what messages call it.
     ///
     /// Planes need θ_r of 0 … 85°, every sweep 1 … 2000 readings, an arc an offset of −1 … 1, a scene ranges within
-    /// 0 … 90°.
+    /// 0 … 90°. A job with a target or a budget that names no plane gets its first planes, and its arc if it names none
+    /// either, from its scene.
     ///
     /// # Errors
-    /// Names file, line, key and what is allowed: unknown or missing keys, wrong types, values out of range, no
-    /// plane or more than 12.
+    /// Names file, line, key and what is allowed: unknown or missing keys, wrong types, values out of range, more than
+    /// 12 planes, or none without a target or a budget.
     pub fn parse(text: &str, name: &str) -> Result<Self, SweepError> {
         let source = Source { text, name };
         let raw: RawJob = toml::from_str(text).map_err(|error| source.toml(&error))?;
-        if raw.plane.is_empty() || raw.plane.len() > MAX_PLANES {
-            let why = format!("{} planes, allowed are 1 … {MAX_PLANES}", raw.plane.len());
-            return Err(source.refuse(None, "[[plane]]", why));
-        }
-        let planes = raw.plane.iter().enumerate().map(|(i, plane)| {
-            let theta_r_deg = source.within(
-                &plane.theta_r_deg,
-                format!("plane[{i}].theta_r_deg"),
-                &THETA_R_DEG,
-            )?;
-            Ok(Plane {
-                theta_r: theta_r_deg.to_radians(),
-                readings: source.readings(&plane.readings, format!("plane[{i}].readings"))?,
-                distribution: plane.distribution,
-            })
-        });
         let until = raw
             .sweep
             .as_ref()
             .map(|sweep| sweep.check(&source, raw.reconstruction.model))
-            .transpose()?;
-        let arc = raw.arc.map(|arc| {
-            let offset = arc
-                .offset
-                .as_ref()
-                .map(|offset| source.within(offset, "arc.offset", &OFFSET))
-                .transpose()?;
-            Ok(Arc {
-                readings: source.readings(&arc.readings, "arc.readings")?,
-                offset: offset.unwrap_or(0.0),
-            })
-        });
+            .transpose()?
+            .flatten();
+        if raw.plane.len() > MAX_PLANES || (raw.plane.is_empty() && until.is_none()) {
+            let why = format!(
+                "{} planes, allowed are 1 … {MAX_PLANES}, or none where sweep.target_male or sweep.budget_s is given",
+                raw.plane.len()
+            );
+            return Err(source.refuse(None, "[[plane]]", why));
+        }
+        let scene = raw.scene.map(|scene| scene.check(&source)).transpose()?;
+        let planes = raw.plane.iter().enumerate();
+        let mut planes: Vec<Plane> = planes
+            .map(|(i, plane)| plane.check(i, &source))
+            .collect::<Result<_, _>>()?;
+        let mut arc = raw.arc.map(|arc| arc.check(&source)).transpose()?;
+        if planes.is_empty() {
+            let (first, along) = first(scene.as_ref());
+            planes = first;
+            arc = arc.or(Some(along));
+        }
         Ok(Self {
             name: name.to_owned(),
             specimen: raw.specimen,
             on_stage: raw.on_stage,
-            planes: planes.collect::<Result<_, _>>()?,
-            arc: arc.transpose()?,
+            planes,
+            arc,
             mode: raw.sweep.as_ref().map_or(Mode::Step, |sweep| sweep.mode),
             model: raw.reconstruction.model,
-            scene: raw.scene.map(|scene| scene.check(&source)).transpose()?,
-            until: until.flatten(),
+            scene,
+            until,
         })
     }
 }

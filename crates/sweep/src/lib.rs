@@ -6,6 +6,7 @@
 mod addition;
 mod error;
 mod file;
+mod first;
 mod floor;
 mod job;
 mod light;

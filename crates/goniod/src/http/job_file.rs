@@ -14,8 +14,9 @@ pub(crate) struct JobFile {
     /// Whether it lies on the stage already; otherwise someone must say so before the job starts.
     #[serde(default)]
     on_stage: bool,
-    /// Plane sweeps.
-    #[schema(min_items = 1, max_items = 12)]
+    /// Plane sweeps, at least one; a job with a target or a budget may leave them to the program.
+    #[schema(max_items = 12)]
+    #[serde(default)]
     plane: Vec<PlaneTable>,
     /// The mirror arc.
     #[serde(default)]

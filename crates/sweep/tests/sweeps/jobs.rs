@@ -1,4 +1,4 @@
-use sweep::{Distribution, Job, Model};
+use sweep::{Distribution, Job, Model, Plane};
 
 use crate::QUICKSTART;
 
@@ -23,15 +23,45 @@ fn what_is_not_said_is_capped_separable_and_without_arc() {
     assert_eq!((job.arc, job.model), (None, Model::Separable));
 }
 
+/// A job that stops when good enough may leave its first sweeps to the program, which goes by its scene.
+#[test]
+fn first_sweeps_that_are_not_named_follow_from_the_scene() {
+    const OPEN: &str = "[reconstruction]\nmodel = \"planes\"\n[sweep]\ntarget_male = 0.001\n";
+    let first = |rest: &str| {
+        let job = Job::parse(&format!("{OPEN}{rest}"), "job.toml").unwrap();
+        let place = |plane: &Plane| (plane.theta_r.to_degrees().round(), plane.readings);
+        let arc = job.arc.map(|arc| arc.readings);
+        (job.planes.iter().map(place).collect::<Vec<_>>(), arc)
+    };
+    let two = vec![(20.0, 16), (70.0, 16)];
+    assert_eq!(first(""), (two.clone(), Some(8)));
+    assert_eq!(
+        first("[scene]\ntheta_i_deg = [0, 60]"),
+        (two, Some(8)),
+        "every viewer is"
+    );
+    let below = "[scene]\ntheta_i_deg = [0, 60]\ntheta_o_deg = [0, 40]\n";
+    assert_eq!(first(below), (vec![(45.0, 16)], Some(4)));
+    assert_eq!(
+        first(&format!("{below}[arc]\nreadings = 9")),
+        (vec![(45.0, 16)], Some(9))
+    );
+    let named = first(&format!("{below}[[plane]]\ntheta_r_deg = 10\nreadings = 20"));
+    assert_eq!(named, (vec![(10.0, 20)], None), "what is named stays");
+}
+
 /// What is wrong with a job file, and what is said about it.
 #[test]
 fn bad_input_is_named_with_line_key_and_range() {
     let plane = "[[plane]]\ntheta_r_deg = 70.0\nreadings = 90\n";
     let table = [
-        ("".to_owned(), "job.toml: [[plane]]: 0 planes, allowed are 1 … 12"),
+        (
+            "".to_owned(),
+            "job.toml: [[plane]]: 0 planes, allowed are 1 … 12, or none where sweep.target_male or sweep.budget_s is given",
+        ),
         (
             plane.repeat(13),
-            "job.toml: [[plane]]: 13 planes, allowed are 1 … 12",
+            "job.toml: [[plane]]: 13 planes, allowed are 1 … 12, or none where sweep.target_male or sweep.budget_s is given",
         ),
         (
             "[[plane]]\ntheta_r_deg = 85.1\nreadings = 90".to_owned(),
