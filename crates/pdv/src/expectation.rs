@@ -147,7 +147,7 @@ impl Signs {
 }
 
 /// Weights of [`Signs::terms`].
-const WEIGHTS: [f64; 8] = [-1.6913, 0.1500, 0.1073, 0.2652, 0.0297, 0.0318, 0.1038, -0.6883];
+const WEIGHTS: [f64; 8] = [-1.5996, 0.2088, 0.1022, 0.1951, 0.0320, 0.2479, 0.0444, -0.3369];
 
 /// Pairs of the scene, each with its share of all that is looked at, and the channels that count.
 struct Over {
