@@ -482,9 +482,10 @@ proptest! {
         let Ok(model) = Planes::from_observations(&[planes.0.clone(), planes.1.clone(), planes.2.clone()], &along) else {
             return Err(TestCaseError::reject("nothing to make a model of"));
         };
-        // Shadowing may brighten a lobe by (1/0.03)², and what lies by the floor may be off by a factor of 2.
+        // Shadowing may brighten a lobe by (1/0.03)², and what lies by the floor may be off by a factor of 2. How far
+        // readings lie below 0 says from where on anything is told from black, and a lobe is never fainter.
         let sweeps = [&planes.0, &planes.1, &planes.2, &along];
-        let brightest = sweeps.into_iter().flatten().map(|o| o.rgb.max_element()).fold(0.0, f64::max);
+        let brightest = sweeps.into_iter().flatten().map(|o| o.rgb.abs().max_element()).fold(0.0, f64::max);
         let bivariate = Bivariate::from_observations(&[planes.0.clone(), planes.1.clone(), planes.2.clone()], &along)
             .expect("it needs no more");
         let grazing = |x: f64| DVec3::new(x, 0.0, 1e-200);
