@@ -99,7 +99,7 @@ fn decide(job: &Job, records: &[Record], rig: &RigFile) -> Result<Extension, Str
     Ok(match best {
         Some(best) => Extension {
             why: format!(
-                "{}: {} readings in {:.1} s are expected to lower the error of {male:.5} by {:.5}",
+                "{}: {} readings in {:.1} s are worth most: they may change the result by {:.5}, and an error of {male:.5} is expected",
                 best.name,
                 best.steps.len(),
                 best.seconds() * clock.pace,
