@@ -12,6 +12,16 @@ const SCENE: &str = "[scene]\ntheta_i_deg = [0, 60]\ntheta_o_deg = [0, 60]\n";
 /// A job that names no sweep.
 const OPEN: &str = "[reconstruction]\nmodel = \"planes\"\n";
 
+/// The built-in rig, and the pairs over which errors are means.
+fn bench() -> (RigFile, Draw) {
+    let rig = RigFile::parse(RigFile::BUILT_IN, "built-in".as_ref()).expect("a good rig file");
+    let draw = Draw {
+        pairs: 20_000,
+        ..Draw::default()
+    };
+    (rig, draw)
+}
+
 fn job(planes_deg: &[f64], readings: usize, scene: &str) -> Job {
     let plane = |deg: &f64| format!("[[plane]]\ntheta_r_deg = {deg:?}\nreadings = {readings}\n");
     let planes: String = planes_deg.iter().map(plane).collect();
@@ -23,11 +33,7 @@ fn job(planes_deg: &[f64], readings: usize, scene: &str) -> Job {
 /// materials of all kinds, with noise and all imperfections.
 #[test]
 fn below_60_degrees_less_time_buys_the_same_error() {
-    let rig = RigFile::parse(RigFile::BUILT_IN, "built-in".as_ref()).expect("a good rig file");
-    let draw = Draw {
-        pairs: 20_000,
-        ..Draw::default()
-    };
+    let (rig, draw) = bench();
     for planes_deg in [
         &[20.0, 45.0, 70.0][..],
         &[10.0, 22.0, 35.0, 48.0, 60.0, 70.0, 80.0],
@@ -75,11 +81,7 @@ fn below_60_degrees_less_time_buys_the_same_error() {
 /// in a scene alone: a quarter of the time at least, over materials of all kinds.
 #[test]
 fn below_60_degrees_the_same_target_is_reached_sooner() {
-    let rig = RigFile::parse(RigFile::BUILT_IN, "built-in".as_ref()).expect("a good rig file");
-    let draw = Draw {
-        pairs: 20_000,
-        ..Draw::default()
-    };
+    let (rig, draw) = bench();
     let names = [
         "gold-paint",
         "blue-rubber",
