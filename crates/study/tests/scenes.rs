@@ -29,6 +29,13 @@ fn job(planes_deg: &[f64], readings: usize, scene: &str) -> Job {
     Job::parse(&format!("{planes}{rest}{scene}"), "job.toml").expect("a good job")
 }
 
+/// Rig seconds that a job takes on a material, and the model of what it reads.
+fn captured(job: &Job, rig: &RigFile, material: Fitted) -> (f64, Box<dyn Model>) {
+    let measured = measure(job, rig, Arc::new(material)).expect("the rig can do it");
+    let model = report::model(job.model, &measured.planes, &measured.arc).expect("enough readings");
+    (measured.rig_s, model)
+}
+
 /// Below 60° rig time is saved, warm-up and dark readings counted, and the error inside is what it was: over six
 /// materials of all kinds, with noise and all imperfections.
 #[test]
@@ -50,10 +57,7 @@ fn below_60_degrees_less_time_buys_the_same_error() {
             let material = Fitted::named(name).expect("a fitted material");
             let found = ["", SCENE].map(|scene| {
                 let job = job(planes_deg, 32, scene);
-                let measured = measure(&job, &rig, Arc::new(material)).expect("the rig can do it");
-                let model =
-                    report::model(job.model, &measured.planes, &measured.arc).expect("enough readings");
-                (measured.rig_s, model)
+                captured(&job, &rig, material)
             });
             let inside = self::job(planes_deg, 32, SCENE).scene.expect("it has one");
             for (sum, (rig_s, model)) in sums.iter_mut().zip(found) {
@@ -100,14 +104,12 @@ fn below_60_degrees_the_same_target_is_reached_sooner() {
             for (sum, scene) in sums.iter_mut().zip(["", SCENE]) {
                 let rest = format!("[sweep]\ntarget_male = {target}\nbudget_s = 120\n{scene}");
                 let job = Job::parse(&format!("{OPEN}{rest}"), "job.toml").expect("a good job");
-                let measured = measure(&job, &rig, Arc::new(material)).expect("the rig can do it");
-                let model =
-                    report::model(job.model, &measured.planes, &measured.arc).expect("enough readings");
+                let (rig_s, model) = captured(&job, &rig, material);
                 let inside = self::job(&[45.0], 1, SCENE).scene.expect("it has one");
                 let found = compare_within(&inside, &material, &[&model as &dyn Brdf], &draw)[0].overall;
                 let male = found.male.expect("pairs are left");
-                println!("{name}, {target}, {scene:?}: {:.1} s, {male:.5}", measured.rig_s);
-                sum[0] += measured.rig_s / names.len() as f64;
+                println!("{name}, {target}, {scene:?}: {rig_s:.1} s, {male:.5}");
+                sum[0] += rig_s / names.len() as f64;
                 sum[1] += male / names.len() as f64;
             }
         }
