@@ -6,13 +6,15 @@ use toml::Spanned;
 
 use super::raw::{RawArm, RawBus, RawMotion, RawPhotometer};
 use super::source::Source;
-use super::{Approach, ArmSettings, BusSettings, Estop, MotionSettings, PhotometerSettings, Port, RigFile};
+use super::{
+    Approach, ArmSettings, BusSettings, Estop, MotionSettings, PhotometerSettings, Port, RigFile, Visits,
+};
 use crate::axis::{
     ACCELERATION_REGISTER_MAX, ACCELERATION_UNIT_RAD_S2, COUNTS_PER_TURN, VELOCITY_REGISTER_MAX,
     VELOCITY_UNIT_RAD_S,
 };
 use crate::dynamixel::{BAUD_RATES, MODELS};
-use crate::{Axis, Lamp, RigError};
+use crate::{Axis, Calibration, Lamp, RigError};
 
 mod calibration;
 mod suspend;
@@ -36,16 +38,7 @@ pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
     let photometer = photometer(source, &raw.photometer)?;
     let calibration = calibration::constants(source, &raw.calibration)?;
     let visits = calibration::visits(source, &raw.calibration, &envelope)?;
-    // Where nothing else follows the lamp, every reading counts on the monitor.
-    let monitored_us = f64::from(photometer.full_scale) / calibration.monitor;
-    if visits.lamp == Lamp::Monitor && f64::from(photometer.integration_max_us) >= monitored_us {
-        return Err(source.refuse(
-            "photometer.integration_max_us",
-            &raw.photometer.integration_max_us,
-            photometer.integration_max_us,
-            format!("below {monitored_us:.0}, where the lamp monitor is full (calibration.monitor)"),
-        ));
-    }
+    monitored(source, &raw.photometer, &photometer, &calibration, &visits)?;
     for (key, id, others) in [
         ("sensor.id", &raw.sensor.id, vec![light.id]),
         ("photometer.id", &raw.photometer.id, vec![light.id, sensor.id]),
@@ -272,4 +265,24 @@ fn photometer(source: &Source<'_>, raw: &RawPhotometer) -> Result<PhotometerSett
             0.0..=600_000.0,
         )?,
     })
+}
+
+/// The longest integration leaves room on the lamp monitor, where nothing else follows the lamp.
+fn monitored(
+    source: &Source<'_>,
+    raw: &RawPhotometer,
+    photometer: &PhotometerSettings,
+    calibration: &Calibration,
+    visits: &Visits,
+) -> Result<(), RigError> {
+    let full_us = f64::from(photometer.full_scale) / calibration.monitor;
+    if visits.lamp != Lamp::Monitor || f64::from(photometer.integration_max_us) < full_us {
+        return Ok(());
+    }
+    Err(source.refuse(
+        "photometer.integration_max_us",
+        &raw.integration_max_us,
+        photometer.integration_max_us,
+        format!("below {full_us:.0}, where the lamp monitor is full (calibration.monitor)"),
+    ))
 }
