@@ -2,9 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 /// What each crate stands on; it may also name what those stand on.
-const EDGES: [(&str, &[&str]); 12] = [
+const EDGES: [(&str, &[&str]); 14] = [
     ("arms", &[]),
     ("brdf", &[]),
     ("pdv", &["brdf"]),
@@ -14,13 +15,29 @@ const EDGES: [(&str, &[&str]); 12] = [
     ("report", &["capture", "pdv", "brdf"]),
     ("firmware-sim", &["brdf", "arms", "rig"]),
     ("study", &["report", "firmware-sim"]),
-    ("goniod", &["report", "firmware-sim"]),
-    ("gonioctl", &["goniod", "report", "study"]),
-    ("tests", &["gonioctl"]),
+    ("session", &["report", "firmware-sim"]),
+    ("api", &[]),
+    ("goniod", &["session", "api"]),
+    ("gonioctl", &["session", "api", "study"]),
+    ("tests", &["gonioctl", "goniod"]),
 ];
 
 /// Crates whose own tests may use the in-process rig.
 const TESTED_ON_THE_SIMULATOR: [&str; 2] = ["capture", "report"];
+
+/// What only the daemon needs: the command line is built, and starts, without it.
+const NOT_IN_THE_COMMAND_LINE: [&str; 10] = [
+    "goniod",
+    "axum",
+    "governor",
+    "hyper",
+    "libsqlite3-sys",
+    "prometheus-client",
+    "sqlx",
+    "tower-http",
+    "utoipa",
+    "utoipa-axum",
+];
 
 /// No I/O but files behind explicit functions: nothing of these may appear in their manifests or sources.
 const PURE: [&str; 4] = ["arms", "brdf", "pdv", "sweep"];
@@ -89,6 +106,35 @@ fn every_crate_stands_only_on_what_lies_below_it() {
                 );
             }
         }
+    }
+}
+
+/// Every package that a package of ours needs to be built, with the features that it asks for.
+fn needs(package: &str) -> BTreeSet<String> {
+    let output = Command::new(env!("CARGO"))
+        .args(["tree", "--offline", "--package", package])
+        .args(["--edges", "normal,build", "--prefix", "none", "--format", "{p}"])
+        .current_dir(root())
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "cargo tree: {said}");
+    let listed = String::from_utf8(output.stdout).unwrap();
+    let name = |line: &str| line.split(' ').next().unwrap_or_default().to_owned();
+    listed.lines().map(name).collect()
+}
+
+#[test]
+fn the_command_line_needs_no_http_server_no_database_and_no_openapi() {
+    let command_line = needs("gonioctl");
+    assert!(command_line.contains("session"), "{command_line:?}");
+    let daemon = needs("goniod");
+    for name in NOT_IN_THE_COMMAND_LINE {
+        assert!(!command_line.contains(name), "gonioctl needs {name}");
+        assert!(
+            daemon.contains(name),
+            "{name} is no dependency of the daemon any more"
+        );
     }
 }
 

@@ -2,9 +2,9 @@ use std::process::ExitCode;
 
 use anyhow::Context;
 use capture::{Command, Event, Outcome};
-use goniod::{Calibrated, Calibration};
 use report::{Standard, WhiteReference};
 use serde_json::json;
+use session::{Calibrated, Calibration};
 use tokio::sync::watch;
 
 use crate::cli::{CalibrateArguments, OnStage};

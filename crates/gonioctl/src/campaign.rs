@@ -3,7 +3,7 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
-use goniod::Status;
+use session::Status;
 use study::{Campaign, Script, Wrong};
 
 use crate::{exit, print};

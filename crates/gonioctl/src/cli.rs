@@ -1,8 +1,8 @@
 use std::path::PathBuf;
 
+use api::{Client, ClientError, JobId};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
-use goniod::JobId;
 
 /// Measures how a flat specimen reflects light, with two servo arms and a photometer.
 ///
@@ -305,6 +305,16 @@ pub(crate) struct DaemonArguments {
     /// File with a token, where the daemon wants one: the token alone, or the daemon's tokens.toml.
     #[arg(long, value_name = "FILE", env = "GONIOD_TOKEN_FILE")]
     pub(crate) token_file: Option<PathBuf>,
+}
+
+impl DaemonArguments {
+    /// The client of that daemon; asks nothing yet.
+    ///
+    /// # Errors
+    /// An address that is none, a token file that holds none.
+    pub(crate) fn client(&self) -> Result<Client, ClientError> {
+        Client::new(self.daemon.as_deref(), self.token_file.as_deref())
+    }
 }
 
 /// One of the arms.

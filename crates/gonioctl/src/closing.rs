@@ -1,7 +1,7 @@
 use std::path::PathBuf;
 
-use goniod::{Ended, Status};
 use serde_json::{Value, json};
+use session::{Ended, Status};
 
 use crate::progress::clock;
 use crate::{eval, print};

@@ -1,26 +1,22 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use goniod::DaemonError;
-use rig::{Drive, Dynamixel, conform};
+use rig::conform;
+use session::OpenRig;
 
 use crate::findings::Findings;
 use crate::print;
 use crate::signals::Signals;
-use crate::wired::Wired;
 
 /// Tries whether a rig behaves as this program expects of it; moves the arms.
 ///
 /// # Errors
 /// The rig file is wrong, or its port cannot be used.
 pub(crate) fn conform(rig: Option<&Path>, restart: bool, as_json: bool) -> anyhow::Result<ExitCode> {
-    let wired = Wired::new(rig)?;
+    let (file, name) = session::rig_file(rig)?;
     let mut findings = Findings::new(as_json);
-    let opened = Dynamixel::open(&wired.port, &wired.file).map_err(|source| DaemonError::Port {
-        file: wired.name.display().to_string(),
-        source: Box::new(source),
-    })?;
-    let mut drive = Drive::new(opened, wired.file.clone());
+    let mut rig = OpenRig::open(&file, &name.display().to_string())?;
+    let drive = &mut rig.drive;
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()?;
@@ -29,7 +25,7 @@ pub(crate) fn conform(rig: Option<&Path>, restart: bool, as_json: bool) -> anyho
         let mut signals = Signals::listen()?;
         let mut tell = |finding| findings.tell(finding);
         tokio::select! {
-            () = conform::conform(&mut drive, restart, &mut tell) => {}
+            () = conform::conform(drive, restart, &mut tell) => {}
             () = signals.next() => {
                 print::say("interrupted; the arms stop, the lamp goes off");
                 drive.stop_all().await;
@@ -39,5 +35,5 @@ pub(crate) fn conform(rig: Option<&Path>, restart: bool, as_json: bool) -> anyho
         }
         Ok(())
     })?;
-    findings.end(&wired.name)
+    findings.end(&name)
 }

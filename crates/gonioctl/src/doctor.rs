@@ -2,28 +2,28 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use rig::doctor::{self, Finding, Host, Verdict};
-use rig::{Device, Drive, Dynamixel};
+use rig::{Device, Drive, Dynamixel, RigFile};
+use session::RigPort;
 
 use crate::findings::Findings;
 use crate::print;
 use crate::signals::Signals;
-use crate::wired::Wired;
 
 /// Checks a rig without moving it, and says what to do about what is wrong.
 ///
 /// # Errors
 /// The rig file is wrong.
 pub(crate) fn doctor(rig: Option<&Path>, out: &Path, as_json: bool) -> anyhow::Result<ExitCode> {
-    let wired = Wired::new(rig)?;
+    let (file, name) = session::rig_file(rig)?;
+    let port = RigPort::new(&file, &name.display().to_string())?;
     let mut findings = Findings::new(as_json);
-    examine(&wired, out, &mut |finding| findings.tell(finding))?;
-    findings.end(&wired.name)
+    examine(port.path(), &file, out, &mut |finding| findings.tell(finding))?;
+    findings.end(&name)
 }
 
 /// All checks, from the machine to the light; those that build on one that failed are left out.
-fn examine(wired: &Wired, out: &Path, tell: &mut dyn FnMut(Finding)) -> anyhow::Result<()> {
+fn examine(port: &Path, file: &RigFile, out: &Path, tell: &mut dyn FnMut(Finding)) -> anyhow::Result<()> {
     tell(doctor::disk(out));
-    let (port, file) = (&wired.port, &wired.file);
     let seen = Host::default().port(port, file.bus.latency.as_secs_f64() * 1e3);
     let usable = seen.iter().all(|finding| finding.verdict != Verdict::Fail);
     seen.into_iter().for_each(&mut *tell);

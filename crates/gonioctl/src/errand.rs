@@ -2,21 +2,21 @@ use std::path::Path;
 use std::process;
 use std::sync::Arc;
 
+use api::{Action, Client, ClientError, Job, JobId, JobState};
 use capture::{Command, FileJournal, Record};
-use goniod::{Job, JobId, JobState, RunView, Status};
 use rig::RigFile;
 use serde_json::Value;
-use ureq::http::StatusCode;
+use session::Status;
 
 use crate::cli::DaemonArguments;
 use crate::closing::Closing;
-use crate::daemon::{ClientError, Daemon};
+use crate::error::CommandError;
 use crate::signals::{STEPS, Signals};
 use crate::{print, queue, watch};
 
 /// A job that a daemon carries out while its client waits.
 pub(crate) struct Errand {
-    daemon: Arc<Daemon>,
+    daemon: Arc<Client>,
     job: JobId,
 }
 
@@ -31,14 +31,13 @@ impl Errand {
         rig: Option<&Path>,
         arguments: &DaemonArguments,
     ) -> anyhow::Result<Option<Self>> {
-        let daemon = Daemon::new(arguments)?;
+        let daemon = arguments.client()?;
         let text = match daemon.read_text("/rig/file") {
             Err(ClientError::Unreachable { .. }) if arguments.daemon.is_none() => return Ok(None),
             text => text?,
         };
         if arguments.daemon.is_none() || rig.is_some() {
-            let (here, name) = goniod::rig_text(rig)?;
-            let here = RigFile::parse(&here, &name)?;
+            let (here, name) = session::rig_file(rig)?;
             if RigFile::parse(&text, "the daemon's rig file".as_ref()).ok() != Some(here) {
                 let name = name.display();
                 anyhow::ensure!(
@@ -70,17 +69,17 @@ impl Errand {
         let Some(Record::Header(header)) = records.first() else {
             return Ok(None);
         };
-        let daemon = Daemon::new(arguments)?;
-        let run: RunView = match daemon.read(&format!("/runs/{}", header.run)) {
+        let daemon = arguments.client()?;
+        let run = match daemon.run(&header.run) {
             Err(ClientError::Unreachable { .. }) if arguments.daemon.is_none() => return Ok(None),
-            Err(ClientError::Refused(refused)) if refused.status == StatusCode::NOT_FOUND => return Ok(None),
+            Err(ClientError::Refused(refused)) if refused.not_found() => return Ok(None),
             run => run?,
         };
-        let job: Job = daemon.read(&format!("/jobs/{}", run.job))?;
+        let job = daemon.job(run.job)?;
         if job.state.over() {
             return Ok(None);
         }
-        let _: Job = daemon.ask(&format!("/jobs/{}/resume", job.id))?;
+        daemon.act_on_job(job.id, Action::Resume)?;
         Ok(Some(Self {
             daemon: Arc::new(daemon),
             job: job.id,
@@ -105,9 +104,9 @@ impl Errand {
         let (job, status) = watch::until_ended(&self.daemon, self.job)?;
         let Some(id) = job.run else {
             let why = job.why.unwrap_or_else(|| format!("the job is {}", job.state));
-            return Err(ClientError::Unbegun { why, status }.into());
+            return Err(CommandError::Unbegun { why, status }.into());
         };
-        let run: RunView = self.daemon.read(&format!("/runs/{id}"))?;
+        let run = self.daemon.run(&id)?;
         // They are missing where they could not be written; the fault that says so was told.
         let file = |name: &str| -> Value {
             let told = self.daemon.read(&format!("/runs/{id}/files/{name}"));
@@ -124,18 +123,18 @@ impl Errand {
 }
 
 /// Whether a daemon could begin a job now: `run` waits for nobody.
-fn free(daemon: &Daemon) -> anyhow::Result<()> {
-    let rig: Value = daemon.read("/rig")?;
-    if let Some(why) = rig["fault"]["text"].as_str() {
-        return Err(ClientError::Busy(format!(
-            "a fault is latched ({why}): look at the rig, then `gonioctl acknowledge`"
+fn free(daemon: &Client) -> anyhow::Result<()> {
+    if let Some(fault) = daemon.rig()?.fault {
+        return Err(CommandError::Busy(format!(
+            "a fault is latched ({}): look at the rig, then `gonioctl acknowledge`",
+            fault.text
         ))
         .into());
     }
-    let jobs: Vec<Job> = daemon.read("/jobs")?;
+    let jobs = daemon.jobs()?;
     let before = |job: &&Job| !job.state.over() && job.state != JobState::Interrupted;
     match jobs.iter().find(before) {
-        Some(job) => Err(ClientError::Busy(format!(
+        Some(job) => Err(CommandError::Busy(format!(
             "job {} is {}: wait for it (`gonioctl watch`), or queue this one with `gonioctl submit`",
             job.id, job.state
         ))
@@ -145,20 +144,20 @@ fn free(daemon: &Daemon) -> anyhow::Result<()> {
 }
 
 /// Says that the specimen is on the stage: whoever says `run` has put it there. A job that cannot start is taken back.
-fn start(daemon: &Daemon, id: JobId) -> Result<(), ClientError> {
-    let Err(refusal) = daemon.ask::<Job>(&format!("/jobs/{id}/ready")) else {
+fn start(daemon: &Client, id: JobId) -> Result<(), ClientError> {
+    let Err(refusal) = daemon.act_on_job(id, Action::Ready) else {
         return Ok(());
     };
     // One whose file says that it lies there has set off by itself.
-    let job: Job = daemon.read(&format!("/jobs/{id}"))?;
+    let job = daemon.job(id)?;
     if !matches!(job.state, JobState::Queued | JobState::AwaitingSpecimen) {
         return Ok(());
     }
-    let _: Job = daemon.ask(&format!("/jobs/{id}/cancel"))?;
+    daemon.act_on_job(id, Action::Cancel)?;
     Err(refusal)
 }
 
-async fn obey(mut signals: Signals, daemon: Arc<Daemon>) {
+async fn obey(mut signals: Signals, daemon: Arc<Client>) {
     for (command, word) in STEPS {
         signals.next().await;
         let path = match command {

@@ -2,9 +2,10 @@ use std::error::Error;
 use std::io;
 use std::process::ExitCode;
 
-use goniod::Status;
+use api::ClientError;
+use session::Status;
 
-use crate::daemon::ClientError;
+use crate::error::CommandError;
 
 /// Exit code of a finished command.
 pub(crate) fn code(status: Status) -> ExitCode {
@@ -19,15 +20,20 @@ pub(crate) fn failure(error: &anyhow::Error) -> (ExitCode, String) {
 
 /// What one error of a chain says about the exit code.
 fn status(error: &(dyn Error + 'static)) -> Option<Status> {
-    if let Some(error) = error.downcast_ref::<goniod::DaemonError>() {
+    if let Some(error) = error.downcast_ref::<session::SessionError>() {
         return Some(error.status());
     }
     if let Some(error) = error.downcast_ref::<ClientError>() {
         return Some(match error {
+            ClientError::Address { .. } | ClientError::TokenFile { .. } | ClientError::NoToken { .. } => {
+                Status::Invalid
+            }
             ClientError::Refused(refused) if refused.invalid() => Status::Invalid,
-            ClientError::Unbegun { status, .. } => *status,
             _ => Status::Daemon,
         });
+    }
+    if let Some(error) = error.downcast_ref::<CommandError>() {
+        return Some(error.status());
     }
     let io = error.downcast_ref::<io::Error>()?;
     report::is_full(io).then_some(Status::Stopped)

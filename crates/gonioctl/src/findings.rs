@@ -1,8 +1,8 @@
 use std::process::ExitCode;
 
-use goniod::Status;
 use rig::doctor::{Bin, Finding, Verdict};
 use serde_json::json;
+use session::Status;
 
 use crate::{exit, print};
 

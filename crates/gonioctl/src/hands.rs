@@ -1,10 +1,11 @@
 use std::process::ExitCode;
 
+use api::client::{Message, Stream};
+use api::{Activity, ArmName, Client, Jog, What};
 use arms::{Arm, ArmAngle};
-use goniod::Status;
-use serde_json::{Value, json};
+use session::Status;
 
-use crate::daemon::{ClientError, Daemon, Stream};
+use crate::error::CommandError;
 use crate::{exit, print};
 
 /// What an operator's hand does with the rig, whatever job is under way.
@@ -24,7 +25,7 @@ impl Hand {
     ///
     /// # Errors
     /// The daemon does not answer, or refuses.
-    pub(crate) fn lay_on(self, daemon: &Daemon, as_json: bool) -> anyhow::Result<ExitCode> {
+    pub(crate) fn lay_on(self, daemon: &Client, as_json: bool) -> anyhow::Result<ExitCode> {
         let said = match self {
             Self::Pause => {
                 daemon.act("/pause")?;
@@ -46,34 +47,40 @@ impl Hand {
         };
         print::say(said);
         if as_json {
-            print::json(&daemon.read::<Value>("/rig")?)?;
+            print::json(&daemon.rig()?)?;
         }
         Ok(ExitCode::SUCCESS)
     }
 
     /// Has arms moved, waits until they stand, and says where.
-    fn drive(self, daemon: &Daemon, as_json: bool) -> anyhow::Result<ExitCode> {
+    fn drive(self, daemon: &Client, as_json: bool) -> anyhow::Result<ExitCode> {
         // Listened to first, so that a short motion is not missed.
         let mut events = daemon.events(None)?;
         match self {
             Self::Jog(arm, angle) => {
-                let arm = arm.to_string();
-                daemon.act_on("/jog", &json!({ "arm": arm, "angle_deg": angle.deg() }))?;
+                let arm = match arm {
+                    Arm::Light => ArmName::Light,
+                    Arm::Sensor => ArmName::Sensor,
+                };
+                daemon.jog(Jog {
+                    arm,
+                    angle_deg: angle.deg(),
+                })?;
             }
             _ => daemon.act("/park")?,
         }
         rest(&mut events)?;
-        let rig: Value = daemon.read("/rig")?;
-        for (i, arm) in Arm::BOTH.into_iter().enumerate() {
-            if let Some(angle_deg) = rig["arms"][i]["measured_deg"].as_f64() {
+        let rig = daemon.rig()?;
+        for (arm, view) in Arm::BOTH.into_iter().zip(&rig.arms) {
+            if let Some(angle_deg) = view.measured_deg {
                 print::say(format_args!("{arm} arm at {angle_deg:.2}°"));
             }
         }
         if as_json {
             print::json(&rig)?;
         }
-        if let Some(fault) = rig["fault"]["text"].as_str() {
-            print::say(format_args!("FAULT: {fault}"));
+        if let Some(fault) = rig.fault {
+            print::say(format_args!("FAULT: {}", fault.text));
             return Ok(exit::code(Status::Rig));
         }
         Ok(ExitCode::SUCCESS)
@@ -81,21 +88,24 @@ impl Hand {
 }
 
 /// Returns once a motion that is told of has ended.
-fn rest(events: &mut Stream) -> Result<(), ClientError> {
-    const LOST: ClientError =
-        ClientError::Absent("the daemon was lost while the arms moved; look at the rig");
+fn rest(events: &mut Stream) -> Result<(), CommandError> {
+    const LOST: CommandError =
+        CommandError::Absent("the daemon was lost while the arms moved; look at the rig");
     let mut moving = false;
     loop {
         let Ok(Some(told)) = events.next() else {
             return Err(LOST);
         };
-        let event: Value = serde_json::from_str(&told.data).unwrap_or_default();
-        match event["activity"]
-            .as_str()
-            .filter(|_| event["event"] == "activity")
-        {
-            Some("moving") => moving = true,
-            Some("idle") if moving => return Ok(()),
+        let Message::Event(event) = told.message() else {
+            continue;
+        };
+        match event.what {
+            What::Activity {
+                activity: Activity::Moving,
+            } => moving = true,
+            What::Activity {
+                activity: Activity::Idle,
+            } if moving => return Ok(()),
             _ => {}
         }
     }

@@ -7,9 +7,9 @@ mod campaign;
 mod cli;
 mod closing;
 mod conform;
-mod daemon;
 mod doctor;
 mod errand;
+mod error;
 mod eval;
 mod exit;
 mod export;
@@ -27,14 +27,12 @@ mod screen;
 mod signals;
 mod study;
 mod watch;
-mod wired;
 
 use std::process::ExitCode;
 
 use arms::{Arm, ArmAngle};
 use clap::Parser;
 use cli::{ArmName, Cli, Command, DaemonArguments, Output};
-use daemon::Daemon;
 use hands::Hand;
 use run::Task;
 use tracing_subscriber::EnvFilter;
@@ -89,18 +87,18 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             return run::run(&task, &daemon, output.json);
         }
         Command::Calibrate(arguments) => return calibrate::calibrate(&arguments),
-        Command::Submit { job, daemon, output } => queue::submit(&Daemon::new(&daemon)?, &job, output.json)?,
-        Command::Jobs { all, daemon, output } => queue::jobs(&Daemon::new(&daemon)?, all, output.json)?,
-        Command::Ready { job, daemon, output } => queue::ready(&Daemon::new(&daemon)?, job, output.json)?,
+        Command::Submit { job, daemon, output } => queue::submit(&daemon.client()?, &job, output.json)?,
+        Command::Jobs { all, daemon, output } => queue::jobs(&daemon.client()?, all, output.json)?,
+        Command::Ready { job, daemon, output } => queue::ready(&daemon.client()?, job, output.json)?,
         Command::Watch { job, daemon, output } => {
-            return watch::watch(&Daemon::new(&daemon)?, job, output.json);
+            return watch::watch(&daemon.client()?, job, output.json);
         }
         Command::Pause { daemon, output } => return lay(Hand::Pause, &daemon, output),
-        Command::Resume { job, daemon, output } => queue::resume(&Daemon::new(&daemon)?, job, output.json)?,
+        Command::Resume { job, daemon, output } => queue::resume(&daemon.client()?, job, output.json)?,
         Command::Stop { daemon, output } => return lay(Hand::Stop, &daemon, output),
         Command::Estop { daemon, output } => return lay(Hand::Estop, &daemon, output),
         Command::Acknowledge { daemon, output } => return lay(Hand::Acknowledge, &daemon, output),
-        Command::Cancel { job, daemon, output } => queue::cancel(&Daemon::new(&daemon)?, job, output.json)?,
+        Command::Cancel { job, daemon, output } => queue::cancel(&daemon.client()?, job, output.json)?,
         Command::Jog {
             arm,
             angle_deg,
@@ -133,11 +131,11 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
         },
         Command::Completions { shell } => manual::completions(shell)?,
         Command::Man { directory } => manual::man(&directory)?,
-        Command::Reconstruct { run, output } => reconstruct::reconstruct(run, output.json)?,
+        Command::Reconstruct { run, output } => return reconstruct::reconstruct(run, output.json),
     }
     Ok(ExitCode::SUCCESS)
 }
 
 fn lay(hand: Hand, daemon: &DaemonArguments, output: Output) -> anyhow::Result<ExitCode> {
-    hand.lay_on(&Daemon::new(daemon)?, output.json)
+    hand.lay_on(&daemon.client()?, output.json)
 }

@@ -10,6 +10,9 @@ use crate::cli::Cli;
 /// Name under which the program is installed.
 const NAME: &str = "gonioctl";
 
+/// The daemon's manual page; a test of goniod keeps it as its command line is.
+const GONIOD: &str = include_str!("../../goniod/goniod.1");
+
 /// Prints the script with which a shell completes commands and options.
 ///
 /// # Errors
@@ -31,6 +34,6 @@ pub(crate) fn completions(shell: Shell) -> anyhow::Result<()> {
 pub(crate) fn man(directory: &Path) -> anyhow::Result<()> {
     std::fs::create_dir_all(directory)
         .and_then(|()| clap_mangen::generate_to(Cli::command(), directory))
-        .and_then(|()| clap_mangen::generate_to(goniod::command(), directory))
+        .and_then(|()| std::fs::write(directory.join("goniod.1"), GONIOD))
         .with_context(|| format!("cannot write manual pages into {}", directory.display()))
 }

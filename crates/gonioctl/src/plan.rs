@@ -1,7 +1,7 @@
 use std::path::Path;
 
-use goniod::Order;
 use serde_json::json;
+use session::RunRequest;
 use sweep::{Light, Plan, Sweep, Until};
 
 use crate::print;
@@ -12,7 +12,7 @@ use crate::progress::clock;
 /// # Errors
 /// What is wrong with the job or the rig file.
 pub(crate) fn plan(job: &Path, rig: Option<&Path>, as_json: bool) -> anyhow::Result<()> {
-    let order = Order::read(job, rig)?;
+    let order = RunRequest::read(job, rig)?;
     let plan = order.plan(None)?;
     if as_json {
         print::json(&json!({

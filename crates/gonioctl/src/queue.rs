@@ -1,15 +1,15 @@
 use std::path::Path;
 
-use goniod::{Job, JobId, JobState};
+use api::{Action, Client, Job, JobId, JobState};
 
-use crate::daemon::{ClientError, Daemon};
+use crate::error::CommandError;
 use crate::print;
 
 /// Adds a job file to the queue; prints the job's id.
 ///
 /// # Errors
 /// The file cannot be read, or is wrong; the daemon does not answer, or refuses.
-pub(crate) fn submit(daemon: &Daemon, file: &Path, as_json: bool) -> anyhow::Result<()> {
+pub(crate) fn submit(daemon: &Client, file: &Path, as_json: bool) -> anyhow::Result<()> {
     let job = hand_in(daemon, file)?;
     if as_json {
         return Ok(print::json(&job)?);
@@ -22,8 +22,8 @@ pub(crate) fn submit(daemon: &Daemon, file: &Path, as_json: bool) -> anyhow::Res
 ///
 /// # Errors
 /// As [`submit`].
-pub(crate) fn hand_in(daemon: &Daemon, file: &Path) -> anyhow::Result<Job> {
-    let text = goniod::job_text(file)?;
+pub(crate) fn hand_in(daemon: &Client, file: &Path) -> anyhow::Result<Job> {
+    let text = session::job_text(file)?;
     let path = format!("/jobs?name={}", encoded(&file.to_string_lossy()));
     Ok(daemon.hand_in(&path, "application/toml", &text)?)
 }
@@ -32,8 +32,8 @@ pub(crate) fn hand_in(daemon: &Daemon, file: &Path) -> anyhow::Result<Job> {
 ///
 /// # Errors
 /// The daemon does not answer, or refuses.
-pub(crate) fn jobs(daemon: &Daemon, all: bool, as_json: bool) -> anyhow::Result<()> {
-    let mut jobs: Vec<Job> = daemon.read("/jobs")?;
+pub(crate) fn jobs(daemon: &Client, all: bool, as_json: bool) -> anyhow::Result<()> {
+    let mut jobs = daemon.jobs()?;
     jobs.retain(|job| all || !job.state.over());
     if as_json {
         return Ok(print::json(&jobs)?);
@@ -60,48 +60,48 @@ pub(crate) fn jobs(daemon: &Daemon, all: bool, as_json: bool) -> anyhow::Result<
 ///
 /// # Errors
 /// No job waits; the daemon does not answer, or refuses.
-pub(crate) fn ready(daemon: &Daemon, job: Option<JobId>, as_json: bool) -> anyhow::Result<()> {
+pub(crate) fn ready(daemon: &Client, job: Option<JobId>, as_json: bool) -> anyhow::Result<()> {
     let id = match job {
         Some(id) => id,
         None => only(daemon, JobState::AwaitingSpecimen)?
-            .ok_or(ClientError::Absent("no job awaits its specimen"))?,
+            .ok_or(CommandError::Absent("no job awaits its specimen"))?,
     };
-    act(daemon, id, "ready", as_json)
+    act(daemon, id, Action::Ready, as_json)
 }
 
 /// Goes on: with the job named, else after a pause, else with the one interrupted job.
 ///
 /// # Errors
 /// Nothing to go on with, or more than one; the daemon does not answer, or refuses.
-pub(crate) fn resume(daemon: &Daemon, job: Option<JobId>, as_json: bool) -> anyhow::Result<()> {
+pub(crate) fn resume(daemon: &Client, job: Option<JobId>, as_json: bool) -> anyhow::Result<()> {
     let paused = only(daemon, JobState::Paused)?;
     if paused.is_some() && (job.is_none() || job == paused) {
         daemon.act("/proceed")?;
         print::say("going on");
         if as_json {
-            print::json(&daemon.read::<serde_json::Value>("/rig")?)?;
+            print::json(&daemon.rig()?)?;
         }
         return Ok(());
     }
     let id = match job {
         Some(id) => id,
-        None => only(daemon, JobState::Interrupted)?.ok_or(ClientError::Absent(
+        None => only(daemon, JobState::Interrupted)?.ok_or(CommandError::Absent(
             "nothing is paused, and no job was interrupted",
         ))?,
     };
-    act(daemon, id, "resume", as_json)
+    act(daemon, id, Action::Resume, as_json)
 }
 
 /// Gives a job up.
 ///
 /// # Errors
 /// The daemon does not answer, or refuses.
-pub(crate) fn cancel(daemon: &Daemon, job: JobId, as_json: bool) -> anyhow::Result<()> {
-    act(daemon, job, "cancel", as_json)
+pub(crate) fn cancel(daemon: &Client, job: JobId, as_json: bool) -> anyhow::Result<()> {
+    act(daemon, job, Action::Cancel, as_json)
 }
 
-fn act(daemon: &Daemon, id: JobId, action: &str, as_json: bool) -> anyhow::Result<()> {
-    let job: Job = daemon.ask(&format!("/jobs/{id}/{action}"))?;
+fn act(daemon: &Client, id: JobId, action: Action, as_json: bool) -> anyhow::Result<()> {
+    let job = daemon.act_on_job(id, action)?;
     if as_json {
         return Ok(print::json(&job)?);
     }
@@ -110,8 +110,8 @@ fn act(daemon: &Daemon, id: JobId, action: &str, as_json: bool) -> anyhow::Resul
 }
 
 /// The one job in a state.
-fn only(daemon: &Daemon, state: JobState) -> anyhow::Result<Option<JobId>> {
-    let jobs: Vec<Job> = daemon.read("/jobs")?;
+fn only(daemon: &Client, state: JobState) -> anyhow::Result<Option<JobId>> {
+    let jobs = daemon.jobs()?;
     let ids: Vec<_> = jobs
         .iter()
         .filter(|job| job.state == state)

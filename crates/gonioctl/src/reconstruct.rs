@@ -1,6 +1,11 @@
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode, Stdio};
 
+use anyhow::Context;
 use report::RunDirectory;
+use serde_json::Value;
+use session::Status;
 
 use crate::print;
 
@@ -8,22 +13,86 @@ use crate::print;
 /// directory's own journal.
 ///
 /// # Errors
-/// No journal there, or a damaged one; a file that cannot be written.
-pub(crate) fn reconstruct(run: PathBuf, as_json: bool) -> anyhow::Result<()> {
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(1)
-        .enable_all()
-        .build()?;
-    let report = match runtime.block_on(goniod::rebuild(&run))? {
-        Some(report) => report,
-        None => report::reconstruct(&RunDirectory::at(run))?,
+/// No journal there, or a damaged one; a file that cannot be written; a store, and no daemon's program that could read it.
+pub(crate) fn reconstruct(run: PathBuf, as_json: bool) -> anyhow::Result<ExitCode> {
+    let directory = RunDirectory::at(&run);
+    let report = match from_store(&run) {
+        Some(Ok(Stored::Report(report))) => report,
+        Some(Ok(Stored::Refused(code))) => return Ok(code),
+        // The journal in the directory may be older than the store, and is all that can be read then.
+        Some(Err(error)) if directory.journal().exists() => {
+            print::say(format_args!(
+                "{error:#}; the journal of the run directory is used"
+            ));
+            serde_json::to_value(report::reconstruct(&directory)?)?
+        }
+        Some(Err(error)) => return Err(error),
+        None => serde_json::to_value(report::reconstruct(&directory)?)?,
     };
     if as_json {
         print::json(&report)?;
-        return Ok(());
+        return Ok(ExitCode::SUCCESS);
     }
-    for check in &report.checks {
-        print::line(format_args!("{}: {}", check.name, check.text))?;
+    for check in report["checks"].as_array().into_iter().flatten() {
+        let text = |key: &str| check[key].as_str().unwrap_or_default();
+        print::line(format_args!("{}: {}", text("name"), text("text")))?;
     }
-    Ok(())
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What the daemon's program made of its store.
+enum Stored {
+    /// report.json.
+    Report(Value),
+    /// It failed, with this exit code, and has said why.
+    Refused(ExitCode),
+}
+
+/// Has the daemon's program make the run directory from the store that lies beside `runs`: only that program reads it.
+/// `None`: there is no store, or it does not know the run.
+fn from_store(run: &Path) -> Option<anyhow::Result<Stored>> {
+    let store = run.parent()?.parent()?.join("goniod.db");
+    let store = if store.is_absolute() || store.parent()? != Path::new("") {
+        store
+    } else {
+        Path::new(".").join(store)
+    };
+    store
+        .exists()
+        .then(|| ask_goniod(run))
+        .and_then(Result::transpose)
+}
+
+fn ask_goniod(run: &Path) -> anyhow::Result<Option<Stored>> {
+    let program = goniod();
+    let output = Command::new(&program)
+        .arg("--reconstruct")
+        .arg(run)
+        .stderr(Stdio::inherit())
+        .output()
+        .with_context(|| {
+            format!(
+                "cannot start {}, which reads the store of the run; install it beside gonioctl",
+                program.display()
+            )
+        })?;
+    if !output.status.success() {
+        let code = output.status.code().and_then(|code| u8::try_from(code).ok());
+        let code = code.unwrap_or(Status::Invalid.code());
+        return Ok(Some(Stored::Refused(ExitCode::from(code))));
+    }
+    let report: Value = serde_json::from_slice(&output.stdout)
+        .with_context(|| format!("{} is of another version", program.display()))?;
+    Ok((!report.is_null()).then_some(Stored::Report(report)))
+}
+
+/// The daemon's program: the one beside this program that is named as this one is, else the one on the search path.
+fn goniod() -> PathBuf {
+    const NAME: &str = "goniod";
+    let beside = std::env::current_exe().ok().and_then(|this| {
+        let name = this.file_name()?.to_str()?.replace("gonioctl", NAME);
+        let beside = this.with_file_name(OsString::from(name));
+        (beside != this && beside.is_file()).then_some(beside)
+    });
+    beside.unwrap_or_else(|| PathBuf::from(NAME))
 }

@@ -3,7 +3,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use capture::{Command, Event};
-use goniod::{DaemonError, Ended, Order};
+use session::{Ended, RunRequest, SessionError};
 use tokio::sync::watch;
 
 use crate::cli::DaemonArguments;
@@ -88,12 +88,12 @@ async fn capture(task: &Task<'_>, control: watch::Receiver<Command>) -> anyhow::
         tracing::debug!(?event);
         progress.show(&event);
     };
-    let ended: Result<Ended, DaemonError> = match task {
+    let ended: Result<Ended, SessionError> = match task {
         Task::New { job, rig, out } => {
-            let order = Order::read(job, *rig)?;
-            goniod::run(&order, out.unwrap_or(Path::new(RUNS)), control, &mut show).await
+            let order = RunRequest::read(job, *rig)?;
+            session::run(&order, out.unwrap_or(Path::new(RUNS)), control, &mut show).await
         }
-        Task::Resume(directory) => goniod::resume(directory, control, &mut show).await,
+        Task::Resume(directory) => session::resume(directory, control, &mut show).await,
     };
     progress.finish();
     Ok(ended?)

@@ -1,8 +1,9 @@
 use std::time::{Duration, Instant};
 
-use goniod::Job;
+use api::client::{Message, ServerSentEvent};
+use api::{FaultView, Job, Progress, RigView, What};
 use indicatif::{ProgressBar, ProgressStyle};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::print;
 use crate::progress::clock;
@@ -40,20 +41,24 @@ impl Screen {
     }
 
     /// Shows an event or a picture of the rig.
-    pub(crate) fn show(&mut self, event: &Value) {
-        let Some(kind) = event["event"].as_str() else {
-            return self.rig(event);
-        };
-        if self.as_json {
-            // A reader that went away ends us with the next event.
-            let _ = print::line(event);
-            return;
+    pub(crate) fn show(&mut self, event: &ServerSentEvent, message: &Message) {
+        match message {
+            Message::Rig(rig) => self.rig(rig),
+            _ if self.as_json => {
+                // A reader that went away ends us with the next event.
+                let _ = print::line(&event.data);
+            }
+            Message::Event(event) => self.event(&event.what),
+            Message::Unknown => tracing::debug!(event.data, "an event of a newer daemon"),
         }
-        match kind {
-            "progress" => self.progress(&event["progress"]),
-            "activity" => self.bar.set_prefix(text(&event["activity"]).replace('_', " ")),
+    }
+
+    fn event(&mut self, what: &What) {
+        match what {
+            What::Progress { progress } => self.progress(progress),
+            What::Activity { activity } => self.bar.set_prefix(activity.to_string()),
             _ => {
-                if let Some(line) = line(event) {
+                if let Some(line) = line(what) {
                     self.say(&line);
                 }
             }
@@ -66,12 +71,7 @@ impl Screen {
             let _ = print::line(json!({ "event": "job", "job": job }));
             return;
         }
-        self.say(&told(
-            job.id,
-            &job.specimen,
-            &job.state.to_string(),
-            job.why.as_deref(),
-        ));
+        self.say(&job_line(job));
     }
 
     /// Says something, above the bar where there is one.
@@ -87,143 +87,146 @@ impl Screen {
         self.bar.finish_and_clear();
     }
 
-    fn rig(&mut self, rig: &Value) {
+    fn rig(&mut self, rig: &RigView) {
         if self.as_json {
             return;
         }
-        self.bar.set_prefix(text(&rig["activity"]).replace('_', " "));
+        self.bar.set_prefix(rig.activity.to_string());
         self.bar.set_message(status(rig));
-        if let Some(progress) = rig.get("progress").filter(|progress| !progress.is_null()) {
+        if let Some(progress) = &rig.progress {
             self.progress(progress);
         }
-        if let Some(fault) = rig.get("fault").filter(|fault| !fault.is_null()) {
-            let line = fault_line(fault);
-            self.say(&line);
+        if let Some(fault) = &rig.fault {
+            self.say(&fault_line(fault));
         }
     }
 
-    fn progress(&mut self, progress: &Value) {
-        let (done, of) = (progress["done"].as_u64(), progress["of"].as_u64());
-        let (Some(done), Some(of)) = (done, of) else {
-            return;
-        };
-        self.bar.set_length(of);
-        self.bar.set_position(done);
+    fn progress(&mut self, progress: &Progress) {
+        let Progress {
+            done,
+            of,
+            seconds_left,
+            ..
+        } = *progress;
+        self.bar.set_length(of as u64);
+        self.bar.set_position(done as u64);
         if self.bar.is_hidden() && self.printed.is_none_or(|at| at.elapsed() >= LINE_EVERY) {
             self.printed = Some(Instant::now());
-            let left = clock(progress["seconds_left"].as_f64().unwrap_or_default());
+            let left = clock(seconds_left);
             print::say(format_args!("{done} of {of} readings, {left} of rig time left"));
         }
     }
 }
 
 /// An event that is worth a line.
-fn line(event: &Value) -> Option<String> {
-    Some(match event["event"].as_str()? {
-        "job" => {
-            let job = &event["job"];
-            let state = text(&job["state"]).replace('_', " ");
-            told(
-                text(&job["id"]),
-                text(&job["specimen"]),
-                &state,
-                job["why"].as_str(),
-            )
-        }
-        "repeat" => format!(
-            "step {} measured again: {:+.2} % against before",
-            event["step"],
-            100.0 * event["difference_rel"].as_f64().unwrap_or(f64::NAN)
+fn line(what: &What) -> Option<String> {
+    Some(match what {
+        What::Job { job } => job_line(job),
+        What::Repeat { step, difference_rel } => format!(
+            "step {step} measured again: {:+.2} % against before",
+            100.0 * difference_rel
         ),
-        "warning" => format!("warning: {}", text(&event["text"])),
-        "fault" => fault_line(&event["fault"]),
-        "acknowledged" => format!("fault acknowledged by {}", text(&event["by"])),
-        "gap" => "some events were missed".to_owned(),
+        What::Warning { text } => format!("warning: {text}"),
+        What::Fault { fault } => fault_line(fault),
+        What::Acknowledged { by } => format!("fault acknowledged by {by}"),
+        What::Gap => "some events were missed".to_owned(),
         _ => return None,
     })
 }
 
-fn told(id: impl std::fmt::Display, specimen: &str, state: &str, why: Option<&str>) -> String {
-    let why = why.map(|why| format!(" ({why})")).unwrap_or_default();
-    format!("{id} {specimen}: {state}{why}")
+fn job_line(job: &Job) -> String {
+    let why = job
+        .why
+        .as_ref()
+        .map(|why| format!(" ({why})"))
+        .unwrap_or_default();
+    format!("{} {}: {}{why}", job.id, job.specimen, job.state)
 }
 
-fn fault_line(fault: &Value) -> String {
+fn fault_line(fault: &FaultView) -> String {
     format!(
         "FAULT {}: {}; `gonioctl acknowledge` once it is looked at",
-        text(&fault["code"]),
-        text(&fault["text"])
+        fault.code, fault.text
     )
 }
 
 /// The rig in a line: angles, lamp, temperature, time left.
-fn status(rig: &Value) -> String {
-    if rig["connected"] == false {
-        return rig["trouble"].as_str().unwrap_or("not connected yet").to_owned();
+fn status(rig: &RigView) -> String {
+    if !rig.connected {
+        let trouble = rig.trouble.as_deref();
+        return trouble.unwrap_or("not connected yet").to_owned();
     }
     let mut parts = Vec::new();
-    for (i, arm) in ["light", "sensor"].into_iter().enumerate() {
-        if let Some(angle) = rig["arms"][i]["measured_deg"].as_f64() {
-            parts.push(format!("{arm} {angle:+.2}°"));
+    for (name, arm) in ["light", "sensor"].into_iter().zip(&rig.arms) {
+        if let Some(angle_deg) = arm.measured_deg {
+            parts.push(format!("{name} {angle_deg:+.2}°"));
         }
     }
-    let lamp = match (rig["lamp"].as_bool(), rig["lamp_monitor"].as_f64()) {
-        (Some(true), Some(output)) => format!("lamp {:.1} %", 100.0 * output),
-        (Some(true), None) => "lamp on".to_owned(),
+    parts.push(match (rig.lamp, rig.lamp_monitor) {
+        (true, Some(output)) => format!("lamp {:.1} %", 100.0 * output),
+        (true, None) => "lamp on".to_owned(),
         _ => "lamp off".to_owned(),
-    };
-    parts.push(lamp);
-    if let Some(temperature) = rig["temperature_c"].as_u64() {
-        parts.push(format!("{temperature} °C"));
+    });
+    if let Some(temperature_c) = rig.temperature_c {
+        parts.push(format!("{temperature_c} °C"));
     }
-    if let Some(left) = rig["progress"]["seconds_left"].as_f64() {
-        parts.push(format!("{} left", clock(left)));
+    if let Some(progress) = &rig.progress {
+        parts.push(format!("{} left", clock(progress.seconds_left)));
     }
     parts.join("  ")
 }
 
-fn text(value: &Value) -> &str {
-    value.as_str().unwrap_or_default()
-}
-
 #[cfg(test)]
 mod tests {
+    use serde_json::from_value;
+
     use super::*;
+
+    fn told(event: serde_json::Value) -> Option<String> {
+        line(&from_value(event).unwrap())
+    }
 
     #[test]
     fn what_is_worth_remembering_is_a_line() {
-        let job = json!({"event": "job", "job": {"id": "01K", "specimen": "gold", "state": "awaiting_specimen", "why": null}});
-        assert_eq!(line(&job).unwrap(), "01K gold: awaiting specimen");
-        let fault = json!({"event": "fault", "fault": {"code": "no_reply", "text": "light servo is silent"}});
+        let id = "01KAGN4Z7Q3X9V5T8R2M6C1D0B";
+        let job = json!({"event": "job", "job": {
+            "id": id, "place": 1, "name": "gold.toml", "specimen": "gold", "on_stage": false, "text": "",
+            "state": "awaiting_specimen", "why": null, "run": null, "by": "", "submitted": "", "changed": "",
+        }});
+        assert_eq!(told(job).unwrap(), format!("{id} gold: awaiting specimen"));
+        let fault = json!({"code": "no_reply", "text": "light servo is silent", "at": "", "run": null});
         assert!(
-            line(&fault)
+            told(json!({"event": "fault", "fault": fault}))
                 .unwrap()
                 .starts_with("FAULT no_reply: light servo is silent; `gonioctl acknowledge`")
         );
         let repeat = json!({"event": "repeat", "step": 3, "difference_rel": -0.0123});
         assert_eq!(
-            line(&repeat).unwrap(),
+            told(repeat).unwrap(),
             "step 3 measured again: -1.23 % against before"
         );
-        assert_eq!(line(&json!({"event": "reading", "run": "01K"})), None);
-        assert_eq!(
-            line(&json!({"event": "of tomorrow"})),
-            None,
-            "a newer daemon is understood as far as can be"
-        );
+        assert_eq!(told(json!({"event": "activity", "activity": "running"})), None);
     }
 
     #[test]
     fn the_rig_fits_a_line() {
+        let arm = |measured_deg: f64| {
+            json!({"measured_deg": measured_deg, "goal_deg": null, "moving": false, "torque": true,
+                "min_deg": -90.0, "max_deg": 90.0})
+        };
         let rig = json!({
-            "connected": true, "activity": "running", "lamp": true, "lamp_monitor": 0.998, "temperature_c": 25,
-            "arms": [{"measured_deg": -45.0}, {"measured_deg": 45.004}], "progress": {"seconds_left": 61.0},
+            "connected": true, "trouble": null, "activity": "running", "arms": [arm(-45.0), arm(45.004)],
+            "separation_deg": 5.0, "can_pass": false, "lamp": true, "lamp_monitor": 0.998, "temperature_c": 25,
+            "fault": null, "job": null, "run": null,
+            "progress": {"done": 1, "of": 2, "seconds_left": 61.0, "retries": 0},
         });
+        let mut rig: RigView = from_value(rig).unwrap();
         assert_eq!(
             status(&rig),
             "light -45.00°  sensor +45.00°  lamp 99.8 %  25 °C  1 min 01 s left"
         );
-        let away = json!({"connected": false, "trouble": "the serial port is gone"});
-        assert_eq!(status(&away), "the serial port is gone");
+        rig.connected = false;
+        rig.trouble = Some("the serial port is gone".to_owned());
+        assert_eq!(status(&rig), "the serial port is gone");
     }
 }

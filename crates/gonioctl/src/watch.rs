@@ -1,10 +1,10 @@
 use std::process::ExitCode;
 use std::time::Duration;
 
-use goniod::{Job, JobId, JobState, Status};
-use serde_json::Value;
+use api::client::{Message, Stream};
+use api::{Client, ClientError, FaultCode, Job, JobId, JobState, What};
+use session::Status;
 
-use crate::daemon::{ClientError, Daemon, Stream};
 use crate::exit;
 use crate::screen::Screen;
 
@@ -16,7 +16,7 @@ const PAUSE: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 /// The daemon does not answer from the first, or refuses.
-pub(crate) fn watch(daemon: &Daemon, job: Option<JobId>, as_json: bool) -> anyhow::Result<ExitCode> {
+pub(crate) fn watch(daemon: &Client, job: Option<JobId>, as_json: bool) -> anyhow::Result<ExitCode> {
     let mut watcher = Watcher::new(daemon, job, as_json);
     let mut stream = daemon.events(None)?;
     watcher.screen.say("watching");
@@ -28,13 +28,13 @@ pub(crate) fn watch(daemon: &Daemon, job: Option<JobId>, as_json: bool) -> anyho
 ///
 /// # Errors
 /// As [`watch`].
-pub(crate) fn until_ended(daemon: &Daemon, job: JobId) -> Result<(Job, Status), ClientError> {
+pub(crate) fn until_ended(daemon: &Client, job: JobId) -> Result<(Job, Status), ClientError> {
     let mut stream = daemon.events(None)?;
     Watcher::new(daemon, Some(job), false).until_end(&mut stream)
 }
 
 struct Watcher<'a> {
-    daemon: &'a Daemon,
+    daemon: &'a Client,
     job: Option<JobId>,
     /// Id of the event that was seen last.
     last: Option<u64>,
@@ -42,7 +42,7 @@ struct Watcher<'a> {
 }
 
 impl<'a> Watcher<'a> {
-    fn new(daemon: &'a Daemon, job: Option<JobId>, as_json: bool) -> Self {
+    fn new(daemon: &'a Client, job: Option<JobId>, as_json: bool) -> Self {
         Self {
             daemon,
             job,
@@ -73,7 +73,7 @@ impl<'a> Watcher<'a> {
     fn follow(&mut self, stream: &mut Stream) -> Result<Option<Job>, ClientError> {
         if let Some(id) = self.job {
             // It may have ended before the stream began.
-            let job: Job = self.daemon.read(&format!("/jobs/{id}"))?;
+            let job = self.daemon.job(id)?;
             self.screen.job(&job);
             if ended(job.state) {
                 return Ok(Some(job));
@@ -82,17 +82,16 @@ impl<'a> Watcher<'a> {
         // A broken stream is a lost daemon, like one that ended.
         while let Ok(Some(told)) = stream.next() {
             self.last = told.id.or(self.last);
-            let Ok(event) = serde_json::from_str::<Value>(&told.data) else {
-                tracing::warn!(data = told.data, "an event that is no JSON");
+            let message = told.message();
+            self.screen.show(&told, &message);
+            let Message::Event(event) = message else {
                 continue;
             };
-            self.screen.show(&event);
-            let job: Option<Job> = event
-                .get("job")
-                .cloned()
-                .and_then(|job| serde_json::from_value(job).ok());
-            if let Some(job) = job.filter(|job| Some(job.id) == self.job && ended(job.state)) {
-                return Ok(Some(job));
+            match event.what {
+                What::Job { job } if Some(job.id) == self.job && ended(job.state) => {
+                    return Ok(Some(*job));
+                }
+                _ => {}
             }
         }
         Ok(None)
@@ -113,13 +112,10 @@ impl<'a> Watcher<'a> {
         Ok(match job.state {
             JobState::Done => Status::Done,
             JobState::Failed => Status::Invalid,
-            JobState::Interrupted => {
-                let rig: Value = self.daemon.read("/rig")?;
-                match rig["fault"]["code"].as_str() {
-                    None | Some("disk_full") => Status::Stopped,
-                    Some(_) => Status::Rig,
-                }
-            }
+            JobState::Interrupted => match self.daemon.rig()?.fault.map(|fault| fault.code) {
+                None | Some(FaultCode::DiskFull) => Status::Stopped,
+                Some(_) => Status::Rig,
+            },
             _ => Status::Stopped,
         })
     }

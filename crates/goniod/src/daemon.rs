@@ -72,7 +72,7 @@ impl Daemon {
         let rig = RigFile::parse(&settings.rig, settings.rig_name.as_ref())?;
         let now = humantime::format_rfc3339_millis((settings.clock)()).to_string();
         let life = store.begin_life(&now).await?;
-        let mut view = RigView::new(&rig);
+        let mut view = crate::view::unknown_rig(&rig);
         view.fault = store.latched().await?;
         let shared = Arc::new(Shared {
             settings,
@@ -112,7 +112,7 @@ impl Daemon {
         let order = self.order(job.to_owned(), "job file".to_owned()).await?;
         blocking(move || {
             let plan = order.plan(None)?;
-            Ok(PlanView::new(&plan, order.light(&plan)))
+            Ok(crate::view::plan(&plan, order.light(&plan)))
         })
         .await?
         .map_err(|error: DaemonError| Refusal::invalid(&error))
@@ -282,7 +282,7 @@ impl Daemon {
         let shared = self.shared.clone();
         blocking(move || {
             let measured = report::measurements(&records, &shared.rig);
-            measured.iter().map(ReadingView::from).collect()
+            measured.iter().map(crate::view::reading).collect()
         })
         .await
     }

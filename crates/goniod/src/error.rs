@@ -3,7 +3,7 @@ use std::path::PathBuf;
 
 use rig::FaultKind;
 
-use crate::Status;
+use session::{SessionError, Status};
 
 /// Why an order was not carried out. What a fault of the rig left behind is no error but a failed outcome.
 #[derive(Debug, thiserror::Error)]
@@ -87,11 +87,33 @@ pub enum DaemonError {
     /// What follows from the journal could not be worked out or written.
     #[error(transparent)]
     Report(#[from] report::ReportError),
+    /// A run was not carried out for a reason of its own.
+    #[error(transparent)]
+    Session(SessionError),
 }
 
 impl From<rig::RigError> for DaemonError {
     fn from(error: rig::RigError) -> Self {
         Self::Rig(Box::new(error))
+    }
+}
+
+impl From<SessionError> for DaemonError {
+    fn from(error: SessionError) -> Self {
+        match error {
+            SessionError::Read { what, path, source } => Self::Read { what, path, source },
+            SessionError::Job(error) => Self::Job(error),
+            SessionError::Rig(error) => Self::Rig(error),
+            SessionError::Port { file, source } => Self::Port { file, source },
+            SessionError::Sim { file, source } => Self::Sim { file, source },
+            SessionError::Uncertified { directory, why } => Self::Uncertified { directory, why },
+            SessionError::Out { path, source } => Self::Out { path, source },
+            SessionError::NotReady(error) => Self::NotReady(error),
+            SessionError::Journal(error) => Self::Journal(error),
+            SessionError::Capture(error) => Self::Capture(error),
+            SessionError::Report(error) => Self::Report(error),
+            other => Self::Session(other),
+        }
     }
 }
 

@@ -146,7 +146,7 @@ impl Hand {
         }
         self.shared.view.send_if_modified(|view| {
             let before = view.clone();
-            view.see(&seen);
+            crate::view::show_snapshot(view, &seen);
             *view != before
         });
         Ok(())
@@ -161,7 +161,9 @@ impl Hand {
             while seen.changed().await.is_ok() {
                 let snapshot = *seen.borrow_and_update();
                 if let Some(snapshot) = snapshot {
-                    shared.view.send_modify(|view| view.see(&snapshot));
+                    shared
+                        .view
+                        .send_modify(|view| crate::view::show_snapshot(view, &snapshot));
                 }
             }
         });

@@ -6,20 +6,18 @@ use std::time::SystemTime;
 
 use anyhow::Context;
 use clap::{CommandFactory, Parser, ValueEnum};
-use rig::RigFile;
 use sd_notify::NotifyState;
+use session::{SessionError, Status};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 use tokio::task::JoinSet;
 use tracing_subscriber::EnvFilter;
 
 use crate::http::{self, Access, Address, Limits, Listener, Tokens};
-use crate::{Daemon, DaemonError, Settings, Status};
+use crate::{Daemon, DaemonError, Settings};
 
 /// Where it is listened on when nothing else is said.
 const LISTEN: &str = "127.0.0.1:4664";
-/// Where the rig file is looked for when none is named.
-const CONFIG: &str = "config/rig.toml";
 /// Threads that answer requests; the rig has one of its own.
 const THREADS: usize = 2;
 
@@ -44,6 +42,10 @@ struct Arguments {
     /// times
     #[arg(long, value_name = "NAME")]
     known_as: Vec<String>,
+    /// Make a run directory of a data folder again from the store beside it, print its report as JSON (null where the store
+    /// does not know the run), and end
+    #[arg(long, value_name = "RUN_DIR", conflicts_with_all = ["config", "listen", "data", "tokens", "known_as"])]
+    reconstruct: Option<PathBuf>,
     /// How the log on stderr is written; RUST_LOG says how much
     #[arg(long, value_enum, default_value = "human")]
     log: Log,
@@ -80,28 +82,43 @@ pub fn main() -> ExitCode {
         .worker_threads(THREADS)
         .enable_all()
         .build();
-    let ended = runtime
-        .context("cannot start")
-        .and_then(|runtime| runtime.block_on(run(arguments)));
+    let ended = runtime.context("cannot start").and_then(|runtime| {
+        runtime.block_on(async {
+            match &arguments.reconstruct {
+                Some(directory) => reconstruct(directory).await,
+                None => run(arguments).await,
+            }
+        })
+    });
     match ended {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             tracing::error!("{error:#}");
-            let known = error
-                .chain()
-                .find_map(|cause| cause.downcast_ref::<DaemonError>());
-            ExitCode::from(known.map_or(Status::Invalid, DaemonError::status).code())
+            let status = error.chain().find_map(status).unwrap_or(Status::Invalid);
+            ExitCode::from(status.code())
         }
     }
+}
+
+/// The exit status that one error of a chain leads to.
+fn status(error: &(dyn std::error::Error + 'static)) -> Option<Status> {
+    let daemon = error.downcast_ref::<DaemonError>().map(DaemonError::status);
+    daemon.or_else(|| error.downcast_ref::<SessionError>().map(SessionError::status))
+}
+
+async fn reconstruct(directory: &Path) -> anyhow::Result<()> {
+    let report = crate::rebuild(directory).await?;
+    println!("{}", serde_json::to_string_pretty(&report)?);
+    Ok(())
 }
 
 async fn run(arguments: Arguments) -> anyhow::Result<()> {
     // Asked for first: a signal during start-up ends it just as well.
     let ended = terminated()?;
-    let (rig, rig_name) = rig_file(arguments.config.as_deref())?;
+    let (rig, rig_name) = session::rig_text(arguments.config.as_deref())?;
     let daemon = Daemon::open(Settings {
         rig,
-        rig_name,
+        rig_name: rig_name.display().to_string(),
         // Clients are told of run directories, and work elsewhere.
         data: std::path::absolute(&arguments.data).context("--data")?,
         clock: SystemTime::now,
@@ -158,18 +175,6 @@ async fn serve(
         }
     }
     Ok(())
-}
-
-/// Text and name of the rig file.
-fn rig_file(named: Option<&Path>) -> anyhow::Result<(String, String)> {
-    let path = match named {
-        Some(path) => path,
-        None if Path::new(CONFIG).exists() => Path::new(CONFIG),
-        None => return Ok((RigFile::BUILT_IN.to_owned(), "built-in rig file".to_owned())),
-    };
-    let text =
-        fs::read_to_string(path).with_context(|| format!("cannot read the rig file {}", path.display()))?;
-    Ok((text, path.display().to_string()))
 }
 
 /// The tokens that are needed at an address.

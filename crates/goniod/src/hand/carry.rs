@@ -6,7 +6,7 @@ use super::{Hand, gone, pressed};
 use crate::queue::{Ending, News};
 use crate::refusal::chain;
 use crate::store::StoreJournal;
-use crate::{Activity, DaemonError, FaultCode, Job, Order, RunView};
+use crate::{Activity, DaemonError, FaultCode, Job, Order, RunView, view};
 
 /// How a capture ended, and the fault that ended it.
 type Captured = (Outcome, Option<FaultCode>);
@@ -154,8 +154,8 @@ fn ending(error: &DaemonError) -> Ending {
     let fault = match error {
         DaemonError::Job(sweep::SweepError::Start { .. }) => Some(FaultCode::Refused),
         DaemonError::Job(_) | DaemonError::Rig(_) => return Ending::Failed { why },
-        DaemonError::NotReady(error) => Some(error.kind().into()),
-        DaemonError::Port { source, .. } => Some(rig::Fault::kind(source.as_ref()).into()),
+        DaemonError::NotReady(error) => Some(view::fault_code(error.kind())),
+        DaemonError::Port { source, .. } => Some(view::fault_code(rig::Fault::kind(source.as_ref()))),
         DaemonError::Store(error) => Some(error.code()),
         DaemonError::Journal(error) => Some(store_code(error)),
         DaemonError::Capture(capture::CaptureError::Journal(error)) => Some(store_code(error)),

@@ -6,7 +6,7 @@ use tokio::sync::mpsc;
 
 use crate::queue::News;
 use crate::shared::Shared;
-use crate::{Activity, FaultCode, Progress, ReadingView, What};
+use crate::{Activity, FaultCode, Progress, What, view};
 
 /// A pose measured again may differ by so much before it is worth a warning: twice the lamp's drift.
 const DIFFERENCE: f64 = 0.01;
@@ -99,13 +99,13 @@ impl Observer {
                 self.shared.tell(What::Progress { progress });
             }
             Event::Suspended { why } => self.shared.warn(format!("the run holds: {why}")),
-            Event::Fault { kind, .. } => self.fault = Some(kind.into()),
+            Event::Fault { kind, .. } => self.fault = Some(view::fault_code(kind)),
         }
     }
 
     fn state(&mut self, state: State) {
         let before = self.shared.view.borrow().activity;
-        let activity = Activity::from(state);
+        let activity = view::activity(state);
         self.shared.activity(activity);
         if activity == Activity::WarmingUp {
             self.shared.view.send_modify(|view| view.lamp = true);
@@ -153,7 +153,7 @@ impl Observer {
         if let Some(measured) = measured {
             self.shared.tell(What::Reading {
                 run: self.run.clone(),
-                reading: Box::new(ReadingView::from(&measured)),
+                reading: Box::new(view::reading(&measured)),
             });
         }
     }

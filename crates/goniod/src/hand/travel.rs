@@ -5,7 +5,7 @@ use tokio::sync::{oneshot, watch};
 
 use super::{Hand, gone, not_ready};
 use crate::refusal::chain;
-use crate::{Activity, DaemonError, FaultCode, Refusal};
+use crate::{Activity, DaemonError, FaultCode, Refusal, view};
 
 /// A motion by hand: its poses, checked.
 struct Way(Vec<Pose>);
@@ -82,7 +82,7 @@ impl Hand {
         };
         left.extend(drive.disengage_all().await);
         let error = left.into_iter().next()?;
-        Some((error.kind().into(), chain(&error)))
+        Some((view::fault_code(error.kind()), chain(&error)))
     }
 
     async fn failed(&mut self, error: DriveError<rig::RigError>) -> Option<(FaultCode, String)> {
@@ -90,7 +90,7 @@ impl Hand {
             station.drive.stop_all().await;
             station.drive.disengage_all().await;
         }
-        let fault = (error.kind().into(), chain(&error));
+        let fault = (view::fault_code(error.kind()), chain(&error));
         if gone(&not_ready(error)) {
             self.station = None;
         }

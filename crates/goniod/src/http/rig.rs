@@ -1,10 +1,9 @@
+use api::{ArmName, Jog};
 use arms::{Arm, ArmAngle};
 use axum::body::Bytes;
 use axum::extract::State;
 use axum::http::{HeaderMap, HeaderName, StatusCode, header};
 use axum::{Extension, Json};
-use serde::Deserialize;
-use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::body;
@@ -15,25 +14,6 @@ use crate::{Caller, RigView};
 /// What an operator's hand does; answered without a body.
 type Done = Result<StatusCode, Problem>;
 const DONE: StatusCode = StatusCode::NO_CONTENT;
-
-/// Where to move one arm.
-#[derive(Deserialize, ToSchema)]
-#[serde(deny_unknown_fields)]
-struct Jog {
-    /// Which arm.
-    arm: ArmName,
-    /// Where to, degrees from the normal, positive towards +x.
-    #[schema(minimum = -90, maximum = 90)]
-    angle_deg: f64,
-}
-
-/// One of the arms.
-#[derive(Clone, Copy, Deserialize, ToSchema)]
-#[serde(rename_all = "lowercase")]
-enum ArmName {
-    Light,
-    Sensor,
-}
 
 pub(crate) fn routes() -> OpenApiRouter<Shared> {
     OpenApiRouter::new()

@@ -6,6 +6,7 @@
 mod access;
 mod documents;
 mod limits;
+mod manual;
 mod service;
 mod unix;
 mod work;

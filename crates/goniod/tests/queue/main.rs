@@ -5,7 +5,6 @@
 
 mod adaptive;
 mod bench;
-mod directions;
 mod faults;
 mod jobs;
 mod operator;

@@ -1,10 +1,32 @@
-use goniod::Status;
+use std::path::PathBuf;
+
 use serde::Deserialize;
 use ureq::http::StatusCode;
 
 /// Why the daemon did not do what was asked of it.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum ClientError {
+#[non_exhaustive]
+pub enum ClientError {
+    /// An address is neither of a computer and a port nor of a socket file.
+    #[error("{address:?} is no address of a daemon, allowed: http://HOST:PORT, unix:PATH")]
+    Address {
+        /// The address as given.
+        address: String,
+    },
+    /// A token file cannot be read.
+    #[error("cannot read the token file {}", .path.display())]
+    TokenFile {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A token file holds no token.
+    #[error("token file {} holds no token: allowed are one token alone, or the daemon's tokens.toml", .path.display())]
+    NoToken {
+        /// Which.
+        path: PathBuf,
+    },
     /// It does not answer.
     #[error(
         "cannot reach the daemon at {address}; is it running (`systemctl status goniod`), and is the address right (--daemon)?"
@@ -18,20 +40,6 @@ pub(crate) enum ClientError {
     /// It refuses.
     #[error("{0}")]
     Refused(Refused),
-    /// There is nothing to do it with.
-    #[error("{0}")]
-    Absent(&'static str),
-    /// It could not begin now.
-    #[error("the daemon cannot run this now: {0}")]
-    Busy(String),
-    /// A job ended before it had a run.
-    #[error("{why}")]
-    Unbegun {
-        /// What kept it from beginning.
-        why: String,
-        /// How the command ends.
-        status: Status,
-    },
     /// What it says is not what this version understands.
     #[error("the daemon at {address} says what this version of gonioctl does not understand")]
     Garbled {
@@ -44,9 +52,9 @@ pub(crate) enum ClientError {
 
 /// A request that the daemon refused.
 #[derive(Debug)]
-pub(crate) struct Refused {
+pub struct Refused {
     /// HTTP status.
-    pub(crate) status: StatusCode,
+    status: StatusCode,
     /// What was wrong, in the daemon's words.
     detail: String,
 }
@@ -66,8 +74,13 @@ impl Refused {
     }
 
     /// Whether what was handed in is wrong, rather than the moment.
-    pub(crate) fn invalid(&self) -> bool {
+    pub fn invalid(&self) -> bool {
         self.status == StatusCode::UNPROCESSABLE_ENTITY
+    }
+
+    /// Whether there is no such thing.
+    pub fn not_found(&self) -> bool {
+        self.status == StatusCode::NOT_FOUND
     }
 }
 

@@ -1,13 +1,10 @@
-use arms::Arm;
-use rig::RigFile;
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
-use super::FaultView;
-use crate::JobId;
+use crate::{FaultView, JobId};
 
 /// Live picture of the rig.
-#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct RigView {
     /// Whether the devices answered when they were asked last.
     pub connected: bool,
@@ -38,7 +35,8 @@ pub struct RigView {
 }
 
 /// What the rig is doing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Activity {
     /// Nothing; arms at rest, lamp off.
@@ -63,22 +61,26 @@ pub enum Activity {
     Moving,
 }
 
-impl From<capture::State> for Activity {
-    fn from(state: capture::State) -> Self {
-        match state {
-            capture::State::Identifying => Self::Identifying,
-            capture::State::Engaging => Self::Engaging,
-            capture::State::WarmingUp => Self::WarmingUp,
-            capture::State::Running => Self::Running,
-            capture::State::Paused => Self::Paused,
-            capture::State::Suspended => Self::Suspended,
-            capture::State::ShuttingDown => Self::ShuttingDown,
-        }
+impl std::fmt::Display for Activity {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Idle => "idle",
+            Self::Identifying => "identifying",
+            Self::Engaging => "engaging",
+            Self::WarmingUp => "warming up",
+            Self::Running => "running",
+            Self::Paused => "paused",
+            Self::Suspended => "suspended",
+            Self::ShuttingDown => "shutting down",
+            Self::Reporting => "reporting",
+            Self::Moving => "moving",
+        })
     }
 }
 
 /// One arm.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ArmView {
     /// Where it was last seen, degrees from the normal, positive towards +x.
     pub measured_deg: Option<f64>,
@@ -95,7 +97,8 @@ pub struct ArmView {
 }
 
 /// How far a run is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Progress {
     /// Steps with an accepted reading.
     pub done: usize,
@@ -105,47 +108,4 @@ pub struct Progress {
     pub seconds_left: f64,
     /// Requests on the bus that had to be repeated.
     pub retries: u32,
-}
-
-impl RigView {
-    /// A rig of which nothing is known but its file.
-    pub(crate) fn new(rig: &RigFile) -> Self {
-        let arm = |arm: Arm| {
-            let limits = rig.envelope.limits(arm);
-            ArmView {
-                measured_deg: None,
-                goal_deg: None,
-                moving: false,
-                torque: false,
-                min_deg: limits.min.deg(),
-                max_deg: limits.max.deg(),
-            }
-        };
-        Self {
-            connected: false,
-            trouble: None,
-            activity: Activity::Idle,
-            arms: Arm::BOTH.map(arm),
-            separation_deg: rig.envelope.separation_rad.to_degrees(),
-            can_pass: rig.envelope.can_pass,
-            lamp: false,
-            lamp_monitor: None,
-            temperature_c: None,
-            fault: None,
-            job: None,
-            run: None,
-            progress: None,
-        }
-    }
-
-    pub(crate) fn see(&mut self, snapshot: &rig::Snapshot) {
-        for (arm, location) in self.arms.iter_mut().zip(&snapshot.arms) {
-            arm.measured_deg = Some(location.measured.deg());
-            arm.goal_deg = Some(location.goal.deg());
-            arm.moving = location.moving;
-            arm.torque = location.torque;
-        }
-        self.connected = true;
-        self.trouble = None;
-    }
 }

@@ -1,8 +1,8 @@
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
 /// A fault, latched until someone acknowledges it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct FaultView {
     /// Its code, which docs/operating.md explains.
     pub code: FaultCode,
@@ -15,7 +15,8 @@ pub struct FaultView {
 }
 
 /// Kind of a fault.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum FaultCode {
     /// Someone pressed the emergency stop.
@@ -48,17 +49,23 @@ pub enum FaultCode {
     Report,
 }
 
-impl From<rig::FaultKind> for FaultCode {
-    fn from(kind: rig::FaultKind) -> Self {
-        use rig::FaultKind as Kind;
-        match kind {
-            Kind::NoReply => Self::NoReply,
-            Kind::Refused => Self::Refused,
-            Kind::Hardware => Self::Hardware,
-            Kind::Motion => Self::Motion,
-            Kind::Disconnected => Self::Disconnected,
-            Kind::Mismatch => Self::Mismatch,
-            _ => Self::Setup,
-        }
+impl std::fmt::Display for FaultCode {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Estop => "estop",
+            Self::NoReply => "no_reply",
+            Self::Refused => "refused",
+            Self::Hardware => "hardware",
+            Self::Motion => "motion",
+            Self::Disconnected => "disconnected",
+            Self::Mismatch => "mismatch",
+            Self::Setup => "setup",
+            Self::DiskFull => "disk_full",
+            Self::StoreLocked => "store_locked",
+            Self::ReadOnly => "read_only",
+            Self::DiskError => "disk_error",
+            Self::Store => "store",
+            Self::Report => "report",
+        })
     }
 }

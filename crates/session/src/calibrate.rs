@@ -8,11 +8,8 @@ use rig::{Certificate, Port, RigFile};
 use tokio::sync::watch;
 use ulid::Ulid;
 
-use crate::certificates::Certificates;
-use crate::order::rig_text;
-use crate::run::{name, prepare, unwritable};
-use crate::station::Station;
-use crate::{DaemonError, Status};
+use crate::run::unwritable;
+use crate::{Certificates, OpenRig, SessionError, Status, prepare_output, rig_text, run_directory_name};
 
 /// A calibration to be made: what lies on the stage of which rig.
 #[derive(Clone, Debug)]
@@ -47,7 +44,7 @@ impl Calibration {
     ///
     /// # Errors
     /// A rig file that cannot be read, or what is wrong in it.
-    pub fn new(rig: Option<&Path>, standard: Standard, specimen: Option<&str>) -> Result<Self, DaemonError> {
+    pub fn new(rig: Option<&Path>, standard: Standard, specimen: Option<&str>) -> Result<Self, SessionError> {
         let (rig_text, name) = rig_text(rig)?;
         let mut rig = RigFile::parse(&rig_text, &name)?;
         if rig.bus.port == Port::Sim
@@ -72,7 +69,7 @@ impl Calibration {
         &self,
         control: watch::Receiver<Command>,
         on_event: &mut (dyn FnMut(Event) + Send),
-    ) -> Result<Calibrated, DaemonError> {
+    ) -> Result<Calibrated, SessionError> {
         let certificates = Certificates::at(&self.rig.certificates.directory);
         let visits = self.standard.visits(&self.rig);
         let plan = |start| {
@@ -84,8 +81,8 @@ impl Calibration {
         };
         plan(None)?;
         let before = certificates.newest(&self.rig)?.unwrap_or_default();
-        prepare(certificates.path())?;
-        let mut station = Station::open(&self.rig, &self.rig_name)?;
+        prepare_output(certificates.path())?;
+        let mut station = OpenRig::open(&self.rig, &self.rig_name)?;
         let start = station.start().await?;
         let now = SystemTime::now();
         let id = Ulid::generate();
@@ -99,7 +96,7 @@ impl Calibration {
             started: made.clone(),
             certificate: None,
         };
-        let directory = RunDirectory::at(certificates.path().join(name(now, &id)));
+        let directory = RunDirectory::at(certificates.path().join(run_directory_name(now, &id)));
         fs::create_dir(directory.path()).map_err(unwritable(directory.path()))?;
         let mut journal = FileJournal::create(directory.journal(), header)?;
         let outcome = capture::run(&mut station.drive, &mut journal, control, on_event).await?;

@@ -1,7 +1,7 @@
 //! What the host adds to a reading: the same job on the simulated bus in wire time, where the host costs nothing, and
 //! in real time, where the bus waits for it.
 //!
-//! `cargo run --release -p goniod --example host_overhead [JOB.toml]`
+//! `cargo run --release -p session --example host_overhead [JOB.toml]`
 //!
 //! In wire time the photometer's clock advances by motion, settling, integration and the bytes on the wire alone;
 //! what it shows more in real time is the host's. Run it on an idle machine: where other programs hold every core, the
@@ -12,7 +12,7 @@ use std::error::Error;
 use std::path::Path;
 
 use capture::Command;
-use goniod::Order;
+use session::RunRequest;
 use tokio::sync::watch;
 
 #[tokio::main]
@@ -37,12 +37,12 @@ async fn main() -> Result<(), Box<dyn Error>> {
 
 /// Milliseconds of the photometer's time for each reading of a whole run, and requests that were repeated.
 async fn measure(job: &Path, clock: &str) -> Result<(f64, u64), Box<dyn Error>> {
-    let mut order = Order::read(job, None)?;
+    let mut order = RunRequest::read(job, None)?;
     order.rig.sim.insert("clock".to_owned(), clock.into());
     let out = tempfile::tempdir()?;
     // The sender lives until the run has ended: nobody stops it.
     let (_operator, control) = watch::channel(Command::Run);
-    let ended = goniod::run(&order, out.path(), control, &mut |_| {}).await?;
+    let ended = session::run(&order, out.path(), control, &mut |_| {}).await?;
     let run = &ended.report.run;
     if ended.outcome != capture::Outcome::Done {
         return Err(format!("the run ended as {:?}", ended.outcome).into());

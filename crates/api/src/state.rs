@@ -1,8 +1,8 @@
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
 
 /// How a job stands. docs/architecture.md draws it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum JobState {
     /// It waits for its turn.
@@ -28,7 +28,7 @@ pub enum JobState {
 
 /// What happens to a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub(crate) enum Cause {
+pub enum Cause {
     /// Its turn has come, and its specimen is not on the stage yet.
     Turn,
     /// It starts: its specimen is on the stage.
@@ -53,7 +53,7 @@ pub(crate) enum Cause {
 
 impl JobState {
     /// The state after something happened; `None` where that cannot happen, or is not allowed, in this one.
-    pub(crate) const fn after(self, cause: Cause) -> Option<Self> {
+    pub const fn after(self, cause: Cause) -> Option<Self> {
         use JobState::{
             AwaitingSpecimen, Cancelled, Done, Failed, Interrupted, Paused, Queued, Running, Stopping,
         };

@@ -9,7 +9,7 @@ use rig::RigFile;
 use sweep::Job;
 use tokio::sync::watch;
 
-use crate::{DaemonError, Order, Status, station::Station};
+use crate::{OpenRig, RunRequest, SessionError, Status};
 
 /// How a run ended, and what came of it.
 #[derive(Debug)]
@@ -39,22 +39,22 @@ impl Ended {
 /// What is wrong with them; a journal that cannot be written any more (what it holds is safe); a report that cannot
 /// be written (`reconstruct` makes it again).
 pub async fn run(
-    order: &Order,
+    order: &RunRequest,
     out: &Path,
     control: watch::Receiver<Command>,
     on_event: &mut (dyn FnMut(Event) + Send),
-) -> Result<Ended, DaemonError> {
+) -> Result<Ended, SessionError> {
     // A job that this rig can never do need not wait for the rig to answer.
     order.plan(None)?;
     let now = SystemTime::now();
     order.certificate(now)?;
-    prepare(out)?;
-    let mut station = Station::open(&order.rig, &order.rig_name)?;
+    prepare_output(out)?;
+    let mut station = OpenRig::open(&order.rig, &order.rig_name)?;
     let start = station.start().await?;
     let plan = order.plan(Some(start))?;
     let id = ulid::Ulid::generate();
     let header = order.header(plan, &id, now)?;
-    let directory = RunDirectory::at(out.join(name(now, &id)));
+    let directory = RunDirectory::at(out.join(run_directory_name(now, &id)));
     fs::create_dir(directory.path()).map_err(unwritable(out))?;
     let mut journal = FileJournal::create(directory.journal(), header)?;
     finish(
@@ -76,7 +76,7 @@ pub async fn resume(
     directory: &Path,
     control: watch::Receiver<Command>,
     on_event: &mut (dyn FnMut(Event) + Send),
-) -> Result<Ended, DaemonError> {
+) -> Result<Ended, SessionError> {
     let directory = RunDirectory::at(directory);
     let mut journal = FileJournal::open(directory.journal())?;
     let Some(Record::Header(header)) = journal.records().first() else {
@@ -90,8 +90,8 @@ pub async fn resume(
             report,
         });
     }
-    let order = Order::resumed(header)?;
-    let mut station = Station::open(&order.rig, &order.rig_name)?;
+    let order = RunRequest::resumed(header)?;
+    let mut station = OpenRig::open(&order.rig, &order.rig_name)?;
     finish(
         directory,
         &order.job,
@@ -106,12 +106,12 @@ pub async fn resume(
 async fn finish(
     directory: RunDirectory,
     job: &Job,
-    station: &mut Station,
+    station: &mut OpenRig,
     journal: &mut FileJournal,
     control: watch::Receiver<Command>,
     on_event: &mut (dyn FnMut(Event) + Send),
-) -> Result<Ended, DaemonError> {
-    let mut ask = ask(job.clone(), station.drive.file().clone());
+) -> Result<Ended, SessionError> {
+    let mut ask = extension_planner(job.clone(), station.drive.file().clone());
     let outcome = capture::run_and_ask(&mut station.drive, journal, control, on_event, &mut ask).await?;
     let report = report::write(&directory, journal.records())?;
     Ok(Ended {
@@ -123,7 +123,7 @@ async fn finish(
 
 /// Asks a job what is measured next, on a thread of its own. Should that panic, nothing more is measured, and what was is
 /// kept.
-pub(crate) fn ask(job: Job, rig: RigFile) -> impl FnMut(&[Record]) -> Thinking + Send {
+pub fn extension_planner(job: Job, rig: RigFile) -> impl FnMut(&[Record]) -> Thinking + Send {
     move |records| {
         let (job, rig, records) = (job.clone(), rig.clone(), records.to_vec());
         let thinking = tokio::task::spawn_blocking(move || report::extension(&job, &records, &rig));
@@ -138,7 +138,10 @@ pub(crate) fn ask(job: Job, rig: RigFile) -> impl FnMut(&[Record]) -> Thinking +
 }
 
 /// Makes the directory of the run directories and tries whether it can be written.
-pub(crate) fn prepare(out: &Path) -> Result<(), DaemonError> {
+///
+/// # Errors
+/// It cannot be made or written.
+pub fn prepare_output(out: &Path) -> Result<(), SessionError> {
     fs::create_dir_all(out).map_err(unwritable(out))?;
     let probe = out.join(format!(".writable-{}", std::process::id()));
     let tried = fs::File::create(&probe).and_then(|mut file| file.write_all(b"1"));
@@ -146,15 +149,15 @@ pub(crate) fn prepare(out: &Path) -> Result<(), DaemonError> {
     tried.and(removed).map_err(unwritable(out))
 }
 
-pub(crate) fn unwritable(path: &Path) -> impl Fn(std::io::Error) -> DaemonError {
-    move |source| DaemonError::Out {
+pub(crate) fn unwritable(path: &Path) -> impl Fn(std::io::Error) -> SessionError {
+    move |source| SessionError::Out {
         path: PathBuf::from(path),
         source,
     }
 }
 
 /// Name of a run directory: when it began, so that a listing is in order, and its id.
-pub(crate) fn name(began: SystemTime, id: &ulid::Ulid) -> String {
+pub fn run_directory_name(began: SystemTime, id: &ulid::Ulid) -> String {
     let time = humantime::format_rfc3339_seconds(began).to_string();
     let time = time.replace([':', '-'], "").replace('T', "-");
     format!("{}-{id}", time.trim_end_matches('Z'))

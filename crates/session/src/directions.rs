@@ -9,8 +9,8 @@ use serde::Deserialize;
 use sweep::SweepError;
 use toml::Spanned;
 
-use crate::DaemonError;
-use crate::order::read;
+use crate::SessionError;
+use crate::run_request::read;
 
 /// Cells along either zenith angle: 5° each.
 const BINS: usize = 18;
@@ -39,7 +39,7 @@ struct Histogram([[f64; BINS]; BINS]);
 ///
 /// # Errors
 /// A file that cannot be read; a name that leads out of the folder; weights or angles that are not what is allowed.
-pub fn job_text(path: &Path) -> Result<String, DaemonError> {
+pub fn job_text(path: &Path) -> Result<String, SessionError> {
     let mut text = read("job file", path, |path| std::fs::read_to_string(path))?;
     // What is wrong with it is told by who reads all of it.
     let named = toml::from_str::<Naming>(&text).ok();
@@ -98,7 +98,7 @@ impl Histogram {
         Some(())
     }
 
-    fn from_csv(path: &Path) -> Result<Self, DaemonError> {
+    fn from_csv(path: &Path) -> Result<Self, SessionError> {
         #[derive(Deserialize)]
         struct Row {
             theta_i_deg: f64,
@@ -128,7 +128,7 @@ impl Histogram {
         Ok(histogram)
     }
 
-    fn from_exr(path: &Path) -> Result<Self, DaemonError> {
+    fn from_exr(path: &Path) -> Result<Self, SessionError> {
         let wrong = |error: exr::error::Error| io::Error::new(io::ErrorKind::InvalidData, error);
         let image = read("histogram of directions", path, |path| {
             let first = read_exr()
@@ -181,8 +181,8 @@ fn line(text: &str, span: &Range<usize>) -> usize {
     text[..span.start].matches('\n').count() + 1
 }
 
-fn refusal(file: &str, line: Option<usize>, key: &str, why: &str) -> DaemonError {
-    DaemonError::Job(SweepError::File {
+fn refusal(file: &str, line: Option<usize>, key: &str, why: &str) -> SessionError {
+    SessionError::Job(SweepError::File {
         file: file.to_owned(),
         line,
         key: key.to_owned(),

@@ -1,9 +1,8 @@
-use report::Measurement;
-use serde::Serialize;
-use utoipa::ToSchema;
+use serde::{Deserialize, Serialize};
 
 /// A reading with what follows from it.
-#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct ReadingView {
     /// Index of its step in the plan.
     pub step: usize,
@@ -39,34 +38,4 @@ pub struct ReadingView {
     pub flags: Vec<String>,
     /// Seconds of rig time since the run began.
     pub time_s: f64,
-}
-
-impl From<&Measurement> for ReadingView {
-    fn from(measurement: &Measurement) -> Self {
-        let reading = &measurement.reading;
-        let counts = &reading.counts;
-        Self {
-            step: reading.step,
-            attempt: reading.attempt,
-            accepted: reading.accepted,
-            sweep: reading.sweep.to_string(),
-            lamp: reading.lamp,
-            light_deg: reading.measured.light.deg(),
-            sensor_deg: reading.measured.sensor.deg(),
-            theta_r_deg: measurement.theta_r.to_degrees(),
-            deviation: measurement.deviation,
-            counts: counts.rgb,
-            monitor: counts.monitor,
-            gain: counts.exposure.gain.into(),
-            integration_us: counts.exposure.integration_us,
-            temperature_c: counts.temperature_c,
-            f: measurement.rgb().map(|rgb| rgb.to_array()),
-            flags: reading
-                .flags
-                .iter()
-                .map(|&flag| report::flag_name(flag).to_owned())
-                .collect(),
-            time_s: measurement.time_s,
-        }
-    }
 }

@@ -8,15 +8,14 @@ use rig::{Certificate, RigFile};
 use sweep::{Job, Light, Plan};
 use ulid::Ulid;
 
-use crate::certificates::Certificates;
-use crate::{DaemonError, job_text};
+use crate::{Certificates, SessionError, job_text};
 
 /// Where a rig file is looked for when none is named, seen from the working directory.
 const RIG_HERE: &str = "config/rig.toml";
 
 /// A job and the rig that is to do it, both read and checked; nothing was touched yet.
 #[derive(Clone, Debug)]
-pub struct Order {
+pub struct RunRequest {
     /// What is to be measured.
     pub job: Job,
     /// The rig.
@@ -29,13 +28,13 @@ pub struct Order {
     pub rig_name: String,
 }
 
-impl Order {
+impl RunRequest {
     /// Reads a job file, with the histogram that it may name, and a rig file: the one named, else config/rig.toml in the
     /// working directory if there is one, else the built-in one.
     ///
     /// # Errors
     /// A file that cannot be read, or what is wrong in it with its place.
-    pub fn read(job: &Path, rig: Option<&Path>) -> Result<Self, DaemonError> {
+    pub fn read(job: &Path, rig: Option<&Path>) -> Result<Self, SessionError> {
         let job_text = job_text(job)?;
         let (rig_text, rig_name) = rig_text(rig)?;
         Self::parse(job_text, &job.to_string_lossy(), rig_text, &rig_name)
@@ -45,17 +44,21 @@ impl Order {
     ///
     /// # Errors
     /// Texts that this version does not accept any more.
-    pub fn resumed(header: &Header) -> Result<Self, DaemonError> {
+    pub fn resumed(header: &Header) -> Result<Self, SessionError> {
         let (job, rig) = (header.job.clone(), header.rig.clone());
         Self::parse(job, "the run's job file", rig, Path::new("the run's rig file"))
     }
 
-    pub(crate) fn parse(
+    /// Reads the texts of a job file and of a rig file; the names are what messages call them.
+    ///
+    /// # Errors
+    /// What is wrong in them, with its place.
+    pub fn parse(
         job_text: String,
         job_name: &str,
         rig_text: String,
         rig_name: &Path,
-    ) -> Result<Self, DaemonError> {
+    ) -> Result<Self, SessionError> {
         Ok(Self {
             job: Job::parse(&job_text, job_name)?,
             rig: RigFile::parse(&rig_text, rig_name)?,
@@ -69,7 +72,7 @@ impl Order {
     ///
     /// # Errors
     /// The rig file asks for a stored calibration and there is no valid one.
-    pub(crate) fn header(&self, plan: Plan, run: &Ulid, now: SystemTime) -> Result<Header, DaemonError> {
+    pub fn header(&self, plan: Plan, run: &Ulid, now: SystemTime) -> Result<Header, SessionError> {
         Ok(Header {
             run: run.to_string(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -85,7 +88,7 @@ impl Order {
     ///
     /// # Errors
     /// There is no valid one.
-    pub(crate) fn certificate(&self, now: SystemTime) -> Result<Option<Certificate>, DaemonError> {
+    pub fn certificate(&self, now: SystemTime) -> Result<Option<Certificate>, SessionError> {
         let settings = &self.rig.certificates;
         settings
             .required
@@ -97,7 +100,7 @@ impl Order {
     ///
     /// # Errors
     /// What of the job this rig cannot do, or that the arms stand where no motion may begin.
-    pub fn plan(&self, start: Option<Pose>) -> Result<Plan, DaemonError> {
+    pub fn plan(&self, start: Option<Pose>) -> Result<Plan, SessionError> {
         Ok(sweep::plan(&self.job, &capture::mechanics(&self.rig, start))?)
     }
 
@@ -112,7 +115,7 @@ impl Order {
 ///
 /// # Errors
 /// The file cannot be read.
-pub fn rig_text(rig: Option<&Path>) -> Result<(String, PathBuf), DaemonError> {
+pub fn rig_text(rig: Option<&Path>) -> Result<(String, PathBuf), SessionError> {
     match rig {
         Some(path) => Ok((
             read("rig file", path, |path| fs::read_to_string(path))?,
@@ -129,13 +132,22 @@ pub fn rig_text(rig: Option<&Path>) -> Result<(String, PathBuf), DaemonError> {
     }
 }
 
-/// Reads a file of an order, which the error names.
+/// Reads and checks a rig file, chosen as [`rig_text`] says, and returns it with what messages call it.
+///
+/// # Errors
+/// The file cannot be read, or what is wrong in it with its place.
+pub fn rig_file(rig: Option<&Path>) -> Result<(RigFile, PathBuf), SessionError> {
+    let (text, name) = rig_text(rig)?;
+    Ok((RigFile::parse(&text, &name)?, name))
+}
+
+/// Reads a file of a request, which the error names.
 pub(crate) fn read<T>(
     what: &'static str,
     path: &Path,
     how: impl Fn(&Path) -> io::Result<T>,
-) -> Result<T, DaemonError> {
-    how(path).map_err(|source| DaemonError::Read {
+) -> Result<T, SessionError> {
+    how(path).map_err(|source| SessionError::Read {
         what,
         path: path.to_owned(),
         source,

@@ -1,23 +1,47 @@
 use std::io::{self, BufRead};
 
-/// One server-sent event.
+use crate::{Event, RigView};
+
+/// One server-sent event, as it came.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Told {
+pub struct ServerSentEvent {
     /// Its id, for those that can be gone on from.
-    pub(crate) id: Option<u64>,
+    pub id: Option<u64>,
     /// Its name; empty where it has none.
-    pub(crate) name: String,
+    pub name: String,
     /// Its data.
-    pub(crate) data: String,
+    pub data: String,
+}
+
+/// What a server-sent event says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Message {
+    /// Something happened.
+    Event(Box<Event>),
+    /// The picture of the rig changed.
+    Rig(Box<RigView>),
+    /// Something that only a newer version understands.
+    Unknown,
+}
+
+impl ServerSentEvent {
+    /// Reads what it says.
+    pub fn message(&self) -> Message {
+        let message = match self.name.as_str() {
+            "rig" => serde_json::from_str(&self.data).map(|view| Message::Rig(Box::new(view))),
+            _ => serde_json::from_str(&self.data).map(|event| Message::Event(Box::new(event))),
+        };
+        message.unwrap_or(Message::Unknown)
+    }
 }
 
 /// Server-sent events as they come (WHATWG HTML, "Server-sent events").
-pub(crate) struct Stream {
+pub struct Stream {
     lines: Box<dyn BufRead>,
 }
 
 impl Stream {
-    pub(crate) fn new(lines: impl BufRead + 'static) -> Self {
+    pub(super) fn new(lines: impl BufRead + 'static) -> Self {
         Self {
             lines: Box::new(lines),
         }
@@ -27,8 +51,9 @@ impl Stream {
     ///
     /// # Errors
     /// The connection broke, or was quiet for too long.
-    pub(crate) fn next(&mut self) -> io::Result<Option<Told>> {
-        let mut told = Told::default();
+    #[expect(clippy::should_implement_trait, reason = "it can fail, and ends once")]
+    pub fn next(&mut self) -> io::Result<Option<ServerSentEvent>> {
+        let mut told = ServerSentEvent::default();
         let mut line = String::new();
         loop {
             line.clear();
@@ -63,12 +88,13 @@ impl Stream {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::What;
 
     #[test]
     fn events_are_told_apart_and_comments_passed_over() {
         let text = ":\n\nid: 7\nevent: job\ndata: {\"a\":\ndata: 1}\n\n: still here\n\nevent: rig\r\ndata:{}\r\n\r\ndata: torn";
         let mut stream = Stream::new(io::Cursor::new(text));
-        let told = |id, name: &str, data: &str| Told {
+        let told = |id, name: &str, data: &str| ServerSentEvent {
             id,
             name: name.to_owned(),
             data: data.to_owned(),
@@ -76,5 +102,26 @@ mod tests {
         assert_eq!(stream.next().unwrap(), Some(told(Some(7), "job", "{\"a\":\n1}")));
         assert_eq!(stream.next().unwrap(), Some(told(None, "rig", "{}")));
         assert_eq!(stream.next().unwrap(), None, "what was cut off is not told");
+    }
+
+    #[test]
+    fn an_event_of_a_newer_daemon_is_passed_on_and_not_understood() {
+        let event = |name: &str, data: &str| ServerSentEvent {
+            name: name.to_owned(),
+            data: data.to_owned(),
+            ..ServerSentEvent::default()
+        };
+        let gap = event("", r#"{"id":7,"at":"2026-01-01T00:00:00Z","event":"gap"}"#);
+        let Message::Event(gap) = gap.message() else {
+            panic!("{gap:?} is an event");
+        };
+        assert_eq!((gap.id, gap.what), (7, What::Gap));
+        for data in [
+            r#"{"id":8,"at":"2026-01-01T00:00:00Z","event":"of tomorrow"}"#,
+            "{",
+        ] {
+            assert_eq!(event("", data).message(), Message::Unknown);
+            assert_eq!(event("rig", data).message(), Message::Unknown);
+        }
     }
 }

@@ -2,18 +2,19 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 use ulid::Ulid;
-use utoipa::ToSchema;
 
 use crate::JobState;
 
 /// Id of a job: a ULID, never reused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(into = "String", try_from = "String")]
-#[schema(value_type = String, example = "01KAGN4Z7Q3X9V5T8R2M6C1D0B")]
+#[cfg_attr(feature = "openapi", schema(value_type = String, example = "01KAGN4Z7Q3X9V5T8R2M6C1D0B"))]
 pub struct JobId(Ulid);
 
 impl JobId {
-    pub(crate) fn generate() -> Self {
+    /// A new one, unlike any other.
+    pub fn generate() -> Self {
         Self(Ulid::generate())
     }
 }
@@ -47,7 +48,8 @@ impl From<JobId> for String {
 }
 
 /// A job in the queue.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct Job {
     /// Its id.
     pub id: JobId,
@@ -75,17 +77,9 @@ pub struct Job {
     pub changed: String,
 }
 
-/// A job to be queued.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Submission {
-    /// Text of the job file, TOML.
-    pub job: String,
-    /// What messages call it.
-    pub name: String,
-}
-
 /// What an operator does with one job.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Action {
     /// Its specimen is on the stage: start.
@@ -96,9 +90,12 @@ pub enum Action {
     Resume,
 }
 
-/// Who asks.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Caller {
-    /// Name for the audit: a token's name, a user, an address.
-    pub name: String,
+impl std::fmt::Display for Action {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Ready => "ready",
+            Self::Cancel => "cancel",
+            Self::Resume => "resume",
+        })
+    }
 }

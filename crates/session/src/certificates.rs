@@ -4,7 +4,7 @@ use std::time::{Duration, SystemTime};
 
 use rig::{Certificate, RigFile};
 
-use crate::DaemonError;
+use crate::SessionError;
 
 /// The stored calibrations of a directory, one JSON file each, named for its id.
 #[derive(Clone, Debug)]
@@ -25,10 +25,10 @@ impl Certificates {
     ///
     /// # Errors
     /// A directory or file that cannot be read, or is no certificate.
-    pub fn newest(&self, rig: &RigFile) -> Result<Option<Certificate>, DaemonError> {
+    pub fn newest(&self, rig: &RigFile) -> Result<Option<Certificate>, SessionError> {
         let failed = |path: &Path| {
             let path = path.to_owned();
-            move |source| DaemonError::Read {
+            move |source| SessionError::Read {
                 what: "calibration",
                 path,
                 source,
@@ -62,8 +62,8 @@ impl Certificates {
     ///
     /// # Errors
     /// There is none, or it is too old; as [`Certificates::newest`].
-    pub fn valid(&self, rig: &RigFile, now: SystemTime) -> Result<Certificate, DaemonError> {
-        let refuse = |why: String| DaemonError::Uncertified {
+    pub fn valid(&self, rig: &RigFile, now: SystemTime) -> Result<Certificate, SessionError> {
+        let refuse = |why: String| SessionError::Uncertified {
             directory: self.0.clone(),
             why,
         };
@@ -96,7 +96,7 @@ impl Certificates {
     ///
     /// # Errors
     /// The medium refused.
-    pub fn keep(&self, certificate: &Certificate) -> Result<PathBuf, DaemonError> {
+    pub fn keep(&self, certificate: &Certificate) -> Result<PathBuf, SessionError> {
         let name = format!("{}.json", certificate.id);
         let directory = report::RunDirectory::at(&self.0);
         directory.write(&name, |file| {

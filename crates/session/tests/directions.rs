@@ -1,15 +1,18 @@
 //! Job files that name a histogram of directions.
 
+// The exemption for tests does not reach what they share.
+#![allow(clippy::unwrap_used)]
+
 use std::fs;
 use std::path::Path;
 
 use exr::prelude::{Image, SpecificChannels, Vec2, WritableImage};
-use goniod::{DaemonError, job_text};
+use session::{SessionError, job_text};
 use sweep::{Cell, Job, Scene};
 
 const HEAD: &str = "[[plane]]\ntheta_r_deg = 60\nreadings = 12\n[scene]\n# what a renderer looked at\n";
 
-fn read(folder: &Path, scene: &str) -> Result<Scene, DaemonError> {
+fn read(folder: &Path, scene: &str) -> Result<Scene, SessionError> {
     let path = folder.join("job.toml");
     fs::write(&path, format!("{HEAD}{scene}\n")).unwrap();
     let text = job_text(&path)?;

@@ -1,9 +1,8 @@
-use serde::Serialize;
-use sweep::{Light, Plan};
-use utoipa::ToSchema;
+use serde::{Deserialize, Serialize};
 
 /// What would be done for a job.
-#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct PlanView {
     /// Readings.
     pub readings: usize,
@@ -21,7 +20,8 @@ pub struct PlanView {
 }
 
 /// Part of a plan.
-#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct SweepView {
     /// "plane 0", "arc", "dark".
     pub sweep: String,
@@ -30,7 +30,8 @@ pub struct SweepView {
 }
 
 /// What the choice of exposures may make of a plan's time, seconds.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct LightView {
     /// Readings whose exposure is chosen on the way.
     pub readings: usize,
@@ -46,21 +47,9 @@ pub struct LightView {
     pub worst_s: f64,
 }
 
-impl From<Light> for LightView {
-    fn from(light: Light) -> Self {
-        Self {
-            readings: light.readings,
-            foreseen_s: light.foreseen_s,
-            least_s: light.least_s,
-            most_s: light.most_s,
-            again_s: light.again_s,
-            worst_s: light.worst_s,
-        }
-    }
-}
-
 /// What a plan leaves out.
-#[derive(Clone, Debug, PartialEq, Serialize, ToSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct LeftOutView {
     /// What.
     pub what: String,
@@ -70,32 +59,4 @@ pub struct LeftOutView {
     pub readings: usize,
     /// Seconds that this saves, as planned.
     pub seconds: f64,
-}
-
-impl PlanView {
-    /// Of a plan and its light.
-    pub(crate) fn new(plan: &Plan, light: Light) -> Self {
-        let mut sweeps: Vec<SweepView> = Vec::new();
-        for step in &plan.steps {
-            let sweep = step.sweep.to_string();
-            match sweeps.iter_mut().find(|known| known.sweep == sweep) {
-                Some(known) => known.readings += 1,
-                None => sweeps.push(SweepView { sweep, readings: 1 }),
-            }
-        }
-        let left_out = plan.left_out.iter().map(|left| LeftOutView {
-            what: left.what.clone(),
-            why: left.why.clone(),
-            readings: left.readings,
-            seconds: left.seconds,
-        });
-        Self {
-            readings: plan.steps.len(),
-            seconds: plan.seconds(),
-            sweeps,
-            light: light.into(),
-            left_out: left_out.collect(),
-            open: plan.open,
-        }
-    }
 }

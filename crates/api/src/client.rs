@@ -8,18 +8,17 @@ use std::io::BufReader;
 use std::path::Path;
 use std::time::Duration;
 
-use anyhow::Context;
 use serde::Deserialize;
+use serde::Serialize;
 use serde::de::DeserializeOwned;
-use serde_json::Value;
 use ureq::http::{Method, Request};
 use ureq::unversioned::resolver::DefaultResolver;
 use ureq::{Agent, Body, SendBody};
 
-pub(crate) use error::{ClientError, Refused};
-pub(crate) use stream::Stream;
+pub use error::{ClientError, Refused};
+pub use stream::{Message, ServerSentEvent, Stream};
 
-use crate::cli::DaemonArguments;
+use crate::{Action, Job, JobId, Jog, RigView, RunView};
 use unix::UnixConnector;
 
 /// A daemon on this machine answers at once; one at the end of a poor line should have by then.
@@ -34,8 +33,8 @@ const USUAL: &str = "http://127.0.0.1:4664";
 /// What the address of a socket file begins with.
 const UNIX: &str = "unix:";
 
-/// Handle of a daemon.
-pub(crate) struct Daemon {
+/// Speaks to a daemon over HTTP, on TCP or on a socket file. Every request blocks until it is answered.
+pub struct Client {
     agent: Agent,
     /// As given, for messages.
     address: String,
@@ -44,13 +43,14 @@ pub(crate) struct Daemon {
     token: Option<String>,
 }
 
-impl Daemon {
-    /// A daemon at the address that the arguments name; asks nothing yet.
+impl Client {
+    /// The client of the daemon at an address, or at the usual one; it reads its token from a file where one is named.
+    /// Asks nothing yet.
     ///
     /// # Errors
     /// An address that is none, a token file that holds none.
-    pub(crate) fn new(arguments: &DaemonArguments) -> anyhow::Result<Self> {
-        let address = arguments.daemon.as_deref().unwrap_or(USUAL);
+    pub fn new(address: Option<&str>, token_file: Option<&Path>) -> Result<Self, ClientError> {
+        let address = address.unwrap_or(USUAL);
         let address = address.trim_end_matches('/').to_owned();
         // No proxy: the daemon is here, or at the end of a tunnel.
         let config = Agent::config_builder()
@@ -66,14 +66,13 @@ impl Daemon {
                 (agent, "http://localhost".to_owned())
             }
             None => {
-                anyhow::ensure!(
-                    address.starts_with("http://"),
-                    "{address:?} is no address of a daemon, allowed: http://HOST:PORT, unix:PATH"
-                );
+                if !address.starts_with("http://") {
+                    return Err(ClientError::Address { address });
+                }
                 (Agent::new_with_config(config), address.clone())
             }
         };
-        let token = arguments.token_file.as_deref().map(token).transpose()?;
+        let token = token_file.map(token).transpose()?;
         Ok(Self {
             agent,
             address,
@@ -86,16 +85,64 @@ impl Daemon {
     ///
     /// # Errors
     /// The daemon does not answer, or refuses.
-    pub(crate) fn read<T: DeserializeOwned>(&self, path: &str) -> Result<T, ClientError> {
+    pub fn read<T: DeserializeOwned>(&self, path: &str) -> Result<T, ClientError> {
         let answer = self.send(Method::GET, path, &[], SendBody::none())?;
         self.decode(answer)
+    }
+
+    /// Returns how the rig is.
+    ///
+    /// # Errors
+    /// As [`Client::read`].
+    pub fn rig(&self) -> Result<RigView, ClientError> {
+        self.read("/rig")
+    }
+
+    /// Returns all jobs, the queue among them, in their order.
+    ///
+    /// # Errors
+    /// As [`Client::read`].
+    pub fn jobs(&self) -> Result<Vec<Job>, ClientError> {
+        self.read("/jobs")
+    }
+
+    /// Returns one job.
+    ///
+    /// # Errors
+    /// As [`Client::read`].
+    pub fn job(&self, id: JobId) -> Result<Job, ClientError> {
+        self.read(&format!("/jobs/{id}"))
+    }
+
+    /// Starts, resumes or cancels a job, and returns how it stands then.
+    ///
+    /// # Errors
+    /// As [`Client::read`].
+    pub fn act_on_job(&self, id: JobId, action: Action) -> Result<Job, ClientError> {
+        self.ask(&format!("/jobs/{id}/{action}"))
+    }
+
+    /// Returns a run.
+    ///
+    /// # Errors
+    /// As [`Client::read`].
+    pub fn run(&self, id: &str) -> Result<RunView, ClientError> {
+        self.read(&format!("/runs/{id}"))
+    }
+
+    /// Moves one arm by hand.
+    ///
+    /// # Errors
+    /// As [`Client::read`].
+    pub fn jog(&self, jog: Jog) -> Result<(), ClientError> {
+        self.act_on("/jog", &jog)
     }
 
     /// Reads the text at a path below the API.
     ///
     /// # Errors
-    /// As [`Daemon::read`].
-    pub(crate) fn read_text(&self, path: &str) -> Result<String, ClientError> {
+    /// As [`Client::read`].
+    pub fn read_text(&self, path: &str) -> Result<String, ClientError> {
         let mut answer = self.send(Method::GET, path, &[], SendBody::none())?;
         answer.read_to_string().map_err(|error| self.unreachable(error))
     }
@@ -103,16 +150,16 @@ impl Daemon {
     /// Asks for an act that has no answer but that it was done or asked for.
     ///
     /// # Errors
-    /// As [`Daemon::read`].
-    pub(crate) fn act(&self, path: &str) -> Result<(), ClientError> {
+    /// As [`Client::read`].
+    pub fn act(&self, path: &str) -> Result<(), ClientError> {
         self.send(Method::POST, path, &[], SendBody::none()).map(drop)
     }
 
     /// Asks for an act and reads the answer.
     ///
     /// # Errors
-    /// As [`Daemon::read`].
-    pub(crate) fn ask<T: DeserializeOwned>(&self, path: &str) -> Result<T, ClientError> {
+    /// As [`Client::read`].
+    pub fn ask<T: DeserializeOwned>(&self, path: &str) -> Result<T, ClientError> {
         let answer = self.send(Method::POST, path, &[], SendBody::none())?;
         self.decode(answer)
     }
@@ -120,8 +167,8 @@ impl Daemon {
     /// Hands in a text and reads the answer.
     ///
     /// # Errors
-    /// As [`Daemon::read`].
-    pub(crate) fn hand_in<T: DeserializeOwned>(
+    /// As [`Client::read`].
+    pub fn hand_in<T: DeserializeOwned>(
         &self,
         path: &str,
         media_type: &str,
@@ -140,9 +187,9 @@ impl Daemon {
     /// Asks for an act that is described in JSON.
     ///
     /// # Errors
-    /// As [`Daemon::read`].
-    pub(crate) fn act_on(&self, path: &str, what: &Value) -> Result<(), ClientError> {
-        let text = what.to_string();
+    /// As [`Client::read`].
+    pub fn act_on(&self, path: &str, what: &impl Serialize) -> Result<(), ClientError> {
+        let text = serde_json::to_string(what).map_err(|source| self.garbled(source))?;
         let headers = [("content-type", "application/json")];
         let body = &mut text.as_bytes();
         self.send(Method::POST, path, &headers, SendBody::from_reader(body))
@@ -152,8 +199,8 @@ impl Daemon {
     /// What happens from now on, or after an event that was seen.
     ///
     /// # Errors
-    /// As [`Daemon::read`].
-    pub(crate) fn events(&self, after: Option<u64>) -> Result<Stream, ClientError> {
+    /// As [`Client::read`].
+    pub fn events(&self, after: Option<u64>) -> Result<Stream, ClientError> {
         let last = after.map(|id| id.to_string());
         let headers: Vec<_> = last.iter().map(|id| ("last-event-id", id.as_str())).collect();
         let body = self.send(Method::GET, "/events", &headers, SendBody::none())?;
@@ -195,10 +242,14 @@ impl Daemon {
 
     fn decode<T: DeserializeOwned>(&self, mut body: Body) -> Result<T, ClientError> {
         let text = body.read_to_string().map_err(|error| self.unreachable(error))?;
-        serde_json::from_str(&text).map_err(|source| ClientError::Garbled {
+        serde_json::from_str(&text).map_err(|source| self.garbled(source))
+    }
+
+    fn garbled(&self, source: serde_json::Error) -> ClientError {
+        ClientError::Garbled {
             address: self.address.clone(),
             source,
-        })
+        }
     }
 
     fn unreachable(&self, source: ureq::Error) -> ClientError {
@@ -210,22 +261,24 @@ impl Daemon {
 }
 
 /// The token in a file: the daemon's own token file, of which the one that operates is taken, or a token alone.
-fn token(path: &Path) -> anyhow::Result<String> {
+fn token(path: &Path) -> Result<String, ClientError> {
     #[derive(Deserialize)]
     struct Tokens {
         operate: String,
     }
-    let text = std::fs::read_to_string(path)
-        .with_context(|| format!("cannot read the token file {}", path.display()))?;
+    let text = std::fs::read_to_string(path).map_err(|source| ClientError::TokenFile {
+        path: path.to_owned(),
+        source,
+    })?;
     if let Ok(Tokens { operate }) = toml::from_str(&text) {
         return Ok(operate);
     }
     let token = text.trim();
-    anyhow::ensure!(
-        !token.is_empty() && token.bytes().all(|byte| byte.is_ascii_graphic()),
-        "token file {} holds no token: allowed are one token alone, or the daemon's tokens.toml",
-        path.display()
-    );
+    if token.is_empty() || !token.bytes().all(|byte| byte.is_ascii_graphic()) {
+        return Err(ClientError::NoToken {
+            path: path.to_owned(),
+        });
+    }
     Ok(token.to_owned())
 }
 
@@ -233,18 +286,15 @@ fn token(path: &Path) -> anyhow::Result<String> {
 mod tests {
     use super::*;
 
-    fn arguments(daemon: &str) -> DaemonArguments {
-        DaemonArguments {
-            daemon: Some(daemon.to_owned()),
-            token_file: None,
-        }
+    fn client(address: &str) -> Result<Client, ClientError> {
+        Client::new(Some(address), None)
     }
 
     #[test]
     fn an_address_is_checked_before_anything_is_asked() {
-        assert!(Daemon::new(&arguments("http://127.0.0.1:4664/")).is_ok());
-        assert!(Daemon::new(&arguments("unix:/run/goniod/socket")).is_ok());
-        let error = Daemon::new(&arguments("127.0.0.1:4664")).err().unwrap();
+        assert!(client("http://127.0.0.1:4664/").is_ok());
+        assert!(client("unix:/run/goniod/socket").is_ok());
+        let error = client("127.0.0.1:4664").err().unwrap();
         assert!(error.to_string().contains("http://HOST:PORT"), "{error}");
     }
 
@@ -255,10 +305,7 @@ mod tests {
             "http://127.0.0.1:1".to_owned(),
             format!("unix:{}/none", directory.path().display()),
         ] {
-            let error = Daemon::new(&arguments(&address))
-                .unwrap()
-                .act("/stop")
-                .unwrap_err();
+            let error = client(&address).unwrap().act("/stop").unwrap_err();
             assert!(matches!(error, ClientError::Unreachable { .. }), "{error}");
             assert!(error.to_string().contains(&address), "{error}");
         }

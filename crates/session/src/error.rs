@@ -1,0 +1,114 @@
+use std::io;
+use std::path::PathBuf;
+
+use rig::FaultKind;
+
+use crate::Status;
+
+/// Why a run or a calibration was not carried out. What a fault of the rig left behind is no error but a failed outcome.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SessionError {
+    /// A job, rig or calibration file cannot be read.
+    #[error("cannot read the {what} {}", .path.display())]
+    Read {
+        /// Which kind of file.
+        what: &'static str,
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The job file is wrong, or this rig cannot do it.
+    #[error(transparent)]
+    Job(#[from] sweep::SweepError),
+    /// The rig file is wrong.
+    #[error(transparent)]
+    Rig(Box<rig::RigError>),
+    /// The port that the rig file names cannot be used.
+    #[error("{file}: bus.port")]
+    Port {
+        /// The rig file.
+        file: String,
+        /// Why not.
+        source: Box<rig::RigError>,
+    },
+    /// The `[sim]` table of the rig file is wrong.
+    #[error("{file}")]
+    Sim {
+        /// The rig file.
+        file: String,
+        /// What is wrong in it.
+        source: firmware_sim::SimError,
+    },
+    /// The rig file asks for a stored calibration, and there is no valid one.
+    #[error("no valid calibration in {}: {why}", .directory.display())]
+    Uncertified {
+        /// Where they are looked for.
+        directory: PathBuf,
+        /// What is missing.
+        why: String,
+    },
+    /// Run directories cannot be made there.
+    #[error("cannot make run directories in {}", .path.display())]
+    Out {
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// The devices are not all there, or not what the rig file says; nothing moved.
+    #[error("the rig is not ready")]
+    NotReady(#[source] Box<rig::DriveError<rig::RigError>>),
+    /// The journal cannot be opened, or not written any more.
+    #[error(transparent)]
+    Journal(#[from] capture::JournalError),
+    /// The capture could not begin, or its journal not go on.
+    #[error(transparent)]
+    Capture(#[from] capture::CaptureError),
+    /// What follows from the journal could not be worked out or written.
+    #[error(transparent)]
+    Report(#[from] report::ReportError),
+}
+
+impl From<rig::RigError> for SessionError {
+    fn from(error: rig::RigError) -> Self {
+        Self::Rig(Box::new(error))
+    }
+}
+
+impl SessionError {
+    /// The exit status that it leads to.
+    pub fn status(&self) -> Status {
+        if self.disk_full() {
+            return Status::Stopped;
+        }
+        match self {
+            Self::NotReady(error) => kind(error.kind()),
+            Self::Rig(error) | Self::Port { source: error, .. } => kind(rig::Fault::kind(error.as_ref())),
+            Self::Job(sweep::SweepError::Start { .. })
+            | Self::Capture(capture::CaptureError::OtherDevices { .. }) => Status::Rig,
+            Self::Capture(capture::CaptureError::Journal(_)) => Status::Stopped,
+            _ => Status::Invalid,
+        }
+    }
+
+    /// Whether the medium is full: what was measured is safe and the run can be resumed.
+    pub fn disk_full(&self) -> bool {
+        let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(self);
+        while let Some(error) = cause {
+            if error.downcast_ref::<io::Error>().is_some_and(report::is_full) {
+                return true;
+            }
+            cause = error.source();
+        }
+        false
+    }
+}
+
+fn kind(kind: FaultKind) -> Status {
+    match kind {
+        FaultKind::Setup => Status::Invalid,
+        _ => Status::Rig,
+    }
+}
