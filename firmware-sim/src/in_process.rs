@@ -9,6 +9,7 @@ mod error;
 mod photometer;
 #[cfg(test)]
 mod tests;
+mod written;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -21,6 +22,7 @@ use tokio::time::Instant;
 pub use axis::InProcessAxis;
 pub use error::InProcessError;
 pub use photometer::InProcessPhotometer;
+pub use written::Written;
 
 use crate::{Bench, Fault, Refusal, SimError};
 
@@ -50,13 +52,9 @@ impl InProcessRig {
         let bench = SharedBench {
             switched_on: Instant::now() - bench.now(),
             bench: Arc::new(Mutex::new(bench)),
+            written: Arc::default(),
         };
-        let axis = |arm| InProcessAxis::new(bench.clone(), file, arm);
-        Self {
-            axes: Arm::BOTH.map(axis),
-            photometer: InProcessPhotometer::new(bench.clone(), file),
-            bench,
-        }
+        bench.rig(file)
     }
 
     /// The bench behind it, to be looked at and tampered with from elsewhere.
@@ -133,9 +131,40 @@ impl Rig for InProcessRig {
 pub struct SharedBench {
     bench: Arc<Mutex<Bench>>,
     switched_on: Instant,
+    /// What devices were told, where somebody wants to know.
+    written: Arc<Mutex<Option<Vec<Written>>>>,
 }
 
 impl SharedBench {
+    /// A rig over this bench, as a program that is started anew opens the port of devices that live on.
+    pub fn rig(&self, file: &RigFile) -> InProcessRig {
+        let axis = |arm| InProcessAxis::new(self.clone(), file, arm);
+        InProcessRig {
+            axes: Arm::BOTH.map(axis),
+            photometer: InProcessPhotometer::new(self.clone(), file),
+            bench: self.clone(),
+        }
+    }
+
+    /// Keeps every write that reaches a device from now on.
+    pub fn keep_writes(&self) {
+        self.log().get_or_insert_default();
+    }
+
+    /// The writes that were kept, oldest first.
+    pub fn writes(&self) -> Vec<Written> {
+        self.log().clone().unwrap_or_default()
+    }
+
+    /// How many writes were kept so far.
+    pub fn write_count(&self) -> usize {
+        self.log().as_ref().map_or(0, Vec::len)
+    }
+
+    fn log(&self) -> MutexGuard<'_, Option<Vec<Written>>> {
+        self.written.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Simulated time since power-on.
     pub fn now(&self) -> Duration {
         self.lock().now()
@@ -219,12 +248,16 @@ impl SharedBench {
     /// Writes a stretch that begins with a register.
     fn write_bytes(&self, device: Device, first: Register, bytes: &[u8]) -> Result<(), InProcessError> {
         let mut bench = self.lock();
+        let at = bench.now();
         let asked = bench.device(device);
         let what = first.name;
         if !asked.listens() {
             return Err(InProcessError::NoReply { device, what });
         }
         asked.heard();
+        if let Some(written) = self.log().as_mut() {
+            written.push(Written::new(at, device, asked, first.address, bytes));
+        }
         asked
             .write(first.address, bytes)
             .map_err(|refusal| InProcessError::Refused {

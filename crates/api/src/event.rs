@@ -1,6 +1,6 @@
 use serde::{Deserialize, Serialize};
 
-use crate::{Activity, FaultView, Job, Progress, ReadingView};
+use crate::{Activity, FaultId, FaultView, Job, Progress, ReadingView};
 
 /// Something that happened, with an id that only ever grows, also across restarts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -72,10 +72,12 @@ pub enum What {
         /// Which.
         fault: FaultView,
     },
-    /// The fault was acknowledged.
+    /// A fault was acknowledged.
     Acknowledged {
         /// By whom.
         by: String,
+        /// The fault's id.
+        id: FaultId,
     },
     /// Events before this one are no longer known: look at everything anew.
     Gap,

@@ -1,9 +1,40 @@
 use serde::{Deserialize, Serialize};
+use ulid::Ulid;
 
-/// A fault, latched until someone acknowledges it.
+/// Id of a fault: a ULID, never reused. Every press of the emergency stop has a new one.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(transparent)]
+#[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
+#[cfg_attr(feature = "openapi", schema(value_type = String, example = "01KAGN4Z7Q3X9V5T8R2M6C1D0B"))]
+pub struct FaultId(String);
+
+impl FaultId {
+    /// A new id.
+    pub fn generate() -> Self {
+        Self(Ulid::generate().to_string())
+    }
+}
+
+impl std::fmt::Display for FaultId {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl From<String> for FaultId {
+    /// The name that somebody gives a fault; whether there is one of that name is for the daemon to say.
+    fn from(name: String) -> Self {
+        Self(name)
+    }
+}
+
+/// A fault, latched until someone acknowledges it by its id.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[cfg_attr(feature = "openapi", derive(utoipa::ToSchema))]
 pub struct FaultView {
+    /// Its id, which an acknowledgement names.
+    #[serde(default = "FaultId::generate")]
+    pub id: FaultId,
     /// Its code, which docs/operating.md explains.
     pub code: FaultCode,
     /// What happened, with its causes.

@@ -4,6 +4,7 @@
 //! [`ReadingView`] and the [`Event`]s of a stream. The feature `client` adds the blocking client; the feature `openapi`
 //! lets the types describe themselves in the daemon's OpenAPI document. This crate knows no rig, no store and no server.
 
+mod acknowledgement;
 #[cfg(feature = "client")]
 pub mod client;
 mod event;
@@ -16,10 +17,11 @@ mod rig;
 mod run;
 mod state;
 
+pub use acknowledgement::Acknowledgement;
 #[cfg(feature = "client")]
 pub use client::{Client, ClientError};
 pub use event::{Event, What};
-pub use fault::{FaultCode, FaultView};
+pub use fault::{FaultCode, FaultId, FaultView};
 pub use job::{Action, Job, JobId};
 pub use jog::{ArmName, Jog};
 pub use plan::{LeftOutView, LightView, PlanView, SweepView};

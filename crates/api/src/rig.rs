@@ -24,8 +24,10 @@ pub struct RigView {
     pub lamp_monitor: Option<f64>,
     /// Temperature of the photometer at the last reading, °C.
     pub temperature_c: Option<u8>,
-    /// The fault that keeps the rig from moving until it is acknowledged.
+    /// The newest fault that keeps the rig from moving until it is acknowledged by its id.
     pub fault: Option<FaultView>,
+    /// Why no job starts by itself: a latched fault, or a stop since which no operator has started a job.
+    pub queue_held: Option<String>,
     /// The job under way.
     pub job: Option<JobId>,
     /// Its run.

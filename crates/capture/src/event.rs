@@ -79,6 +79,8 @@ pub enum Event {
         /// By how much the brightest channel differs from before, relative to the lamp monitor.
         difference_rel: f64,
     },
+    /// The arms were told to stop, or stand where they are, and the lamp is off: no goal is written any more.
+    Safe,
     /// A fault of the rig ends it.
     Fault {
         /// What kind.

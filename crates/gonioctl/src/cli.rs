@@ -127,7 +127,7 @@ pub(crate) enum Command {
         #[command(flatten)]
         output: Output,
     },
-    /// Brake now, hold the arms, lamp off; the job can be resumed.
+    /// Brake now, hold the arms, lamp off; the job can be resumed, and nothing starts until an operator starts it.
     Stop {
         #[command(flatten)]
         daemon: DaemonArguments,
@@ -141,8 +141,11 @@ pub(crate) enum Command {
         #[command(flatten)]
         output: Output,
     },
-    /// Acknowledge a fault: somebody has looked at the rig.
+    /// Acknowledge a fault by its id: somebody has looked at the rig. Shows the newest one and asks, unless it is named.
     Acknowledge {
+        /// Id of the fault, as `gonioctl watch`, the page and the daemon's log show it.
+        #[arg(long, value_name = "ID")]
+        fault: Option<String>,
         #[command(flatten)]
         daemon: DaemonArguments,
         #[command(flatten)]

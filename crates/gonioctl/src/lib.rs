@@ -2,6 +2,7 @@
 //!
 //! Data goes to stdout, talk to stderr; the exit code says how it ended.
 
+mod acknowledge;
 mod calibrate;
 mod campaign;
 mod cli;
@@ -14,8 +15,8 @@ mod eval;
 mod exit;
 mod export;
 mod findings;
-mod hands;
 mod manual;
+mod operator;
 mod plan;
 mod ports;
 mod print;
@@ -33,7 +34,7 @@ use std::process::ExitCode;
 use arms::{Arm, ArmAngle};
 use clap::Parser;
 use cli::{ArmName, Cli, Command, DaemonArguments, Output};
-use hands::Hand;
+use operator::OperatorCommand;
 use run::Task;
 use tracing_subscriber::EnvFilter;
 
@@ -93,11 +94,15 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
         Command::Watch { job, daemon, output } => {
             return watch::watch(&daemon.client()?, job, output.json);
         }
-        Command::Pause { daemon, output } => return lay(Hand::Pause, &daemon, output),
+        Command::Pause { daemon, output } => return send(OperatorCommand::Pause, &daemon, output),
         Command::Resume { job, daemon, output } => queue::resume(&daemon.client()?, job, output.json)?,
-        Command::Stop { daemon, output } => return lay(Hand::Stop, &daemon, output),
-        Command::Estop { daemon, output } => return lay(Hand::Estop, &daemon, output),
-        Command::Acknowledge { daemon, output } => return lay(Hand::Acknowledge, &daemon, output),
+        Command::Stop { daemon, output } => return send(OperatorCommand::Stop, &daemon, output),
+        Command::Estop { daemon, output } => return send(OperatorCommand::Estop, &daemon, output),
+        Command::Acknowledge {
+            fault,
+            daemon,
+            output,
+        } => return acknowledge::acknowledge(&daemon.client()?, fault.as_deref(), output.json),
         Command::Cancel { job, daemon, output } => queue::cancel(&daemon.client()?, job, output.json)?,
         Command::Jog {
             arm,
@@ -109,9 +114,13 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
                 ArmName::Light => Arm::Light,
                 ArmName::Sensor => Arm::Sensor,
             };
-            return lay(Hand::Jog(arm, ArmAngle::from_deg(angle_deg)), &daemon, output);
+            return send(
+                OperatorCommand::Jog(arm, ArmAngle::from_deg(angle_deg)),
+                &daemon,
+                output,
+            );
         }
-        Command::Park { daemon, output } => return lay(Hand::Park, &daemon, output),
+        Command::Park { daemon, output } => return send(OperatorCommand::Park, &daemon, output),
         Command::Export { run, format, to } => export::export(&run, format, to.as_deref())?,
         Command::Eval {
             truth,
@@ -136,6 +145,6 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn lay(hand: Hand, daemon: &DaemonArguments, output: Output) -> anyhow::Result<ExitCode> {
-    hand.lay_on(&daemon.client()?, output.json)
+fn send(command: OperatorCommand, daemon: &DaemonArguments, output: Output) -> anyhow::Result<ExitCode> {
+    command.send(&daemon.client()?, output.json)
 }

@@ -128,7 +128,7 @@ fn line(what: &What) -> Option<String> {
         ),
         What::Warning { text } => format!("warning: {text}"),
         What::Fault { fault } => fault_line(fault),
-        What::Acknowledged { by } => format!("fault acknowledged by {by}"),
+        What::Acknowledged { by, id } => format!("fault {id} acknowledged by {by}"),
         What::Gap => "some events were missed".to_owned(),
         _ => return None,
     })

@@ -122,7 +122,8 @@ function showNow() {
   const under = job && !OVER.includes(job.state);
   $("pause").disabled = !operates() || !under || job.state !== "running";
   $("proceed").disabled = !operates() || !under || job.state !== "paused";
-  $("stop").disabled = !operates() || !(under || rig.activity === "moving");
+  // Never refused: pressed between two jobs it holds the next one.
+  $("stop").disabled = !operates();
   for (const control of $("jog-form").elements) control.disabled = !operates() || Boolean(under) || Boolean(rig.fault);
 }
 
@@ -135,7 +136,10 @@ function measurePace(left) {
 
 function showFault() {
   const { fault } = rig;
-  if ($("fault").hidden === !fault && $("fault-text").textContent === (fault?.text ?? "")) return;
+  $("held").textContent = rig.queue_held && !fault ? `No job starts by itself: ${rig.queue_held}.` : "";
+  // Two faults may say the same; whoever has seen only the first one must not acknowledge the second.
+  if ($("fault").dataset.id === (fault?.id ?? "")) return;
+  $("fault").dataset.id = fault?.id ?? "";
   $("fault").hidden = !fault;
   $("fault-code").textContent = fault ? `Fault: ${fault.code.replaceAll("_", " ")}.` : "";
   $("fault-text").textContent = fault?.text ?? "";
@@ -344,7 +348,8 @@ async function estop() {
 
 const press = (id, run) => $(id).addEventListener("click", run);
 press("estop", estop);
-press("acknowledge", () => act("Acknowledge", "POST", "/acknowledge"));
+// The fault that is on the screen, whatever came since: somebody has looked at the rig because of that one.
+press("acknowledge", () => act("Acknowledge", "POST", "/acknowledge", { fault: $("fault").dataset.id }));
 press("pause", () => act("Pause", "POST", "/pause"));
 press("proceed", () => act("Go on", "POST", "/proceed"));
 press("stop", () => act("Stop", "POST", "/stop"));

@@ -8,19 +8,24 @@ use report::RunDirectory;
 use rig::RigFile;
 use tokio::sync::{mpsc, oneshot, watch};
 
+use crate::audit::Audit;
 use crate::event::Log;
-use crate::hand::Hand;
 use crate::lock::Lock;
-use crate::queue::{Ask, News, Queue, Verb};
+use crate::operator::{NotKept, OperatorControl};
+use crate::queue::{Queue, Request};
 use crate::refusal::chain;
 use crate::shared::Shared;
+use crate::worker::{RigWorker, WorkerPlace};
 use crate::{
-    Action, Activity, Caller, DaemonError, Events, Job, JobId, Order, PlanView, ReadingView, Refusal,
-    RefusalKind, RigView, RunView, Sqlite, Store, Submission,
+    Action, Caller, DaemonError, Events, FaultId, Job, JobId, PlanView, PortOfFile, ReadingView, Refusal,
+    RefusalKind, RigSource, RigView, RunView, Sqlite, Store, Submission,
 };
+use session::RunRequest;
 
 /// Requests that may wait for the queue; a further one is refused.
-const ASKS: usize = 64;
+const REQUESTS: usize = 64;
+/// Events of the worker that may wait for the queue.
+const WORKER_EVENTS: usize = 8;
 /// Most jobs that are over, and most runs, in one answer.
 const LISTED: u32 = 500;
 /// Most bytes of a job file.
@@ -48,8 +53,8 @@ pub struct Settings {
 #[derive(Clone)]
 pub struct Daemon {
     shared: Arc<Shared>,
-    asks: mpsc::Sender<Ask>,
-    news: mpsc::UnboundedSender<News>,
+    requests: mpsc::Sender<Request>,
+    ended: watch::Receiver<bool>,
 }
 
 impl Daemon {
@@ -62,33 +67,69 @@ impl Daemon {
     /// A rig file that is wrong; a data folder that cannot be written, or is in use; a store that cannot be opened; a
     /// port that another program has.
     pub async fn open(settings: Settings) -> Result<Self, DaemonError> {
-        crate::run::prepare(&settings.data)?;
+        session::prepare_output(&settings.data)?;
         let lock = Lock::take(&settings.data)?;
         let store = Sqlite::open(&settings.data.join("goniod.db")).await?;
-        Self::start(settings, Arc::new(store), lock).await
+        Self::start(settings, Arc::new(store), lock, PortOfFile, WorkerPlace::Thread).await
     }
 
-    async fn start(settings: Settings, store: Arc<dyn Store>, lock: Lock) -> Result<Self, DaemonError> {
+    /// As [`Self::open`], with a store and a rig of the caller's, and the worker where the caller wants it.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub async fn open_with(
+        settings: Settings,
+        store: Arc<dyn Store>,
+        source: impl RigSource,
+        place: WorkerPlace,
+    ) -> Result<Self, DaemonError> {
+        session::prepare_output(&settings.data)?;
+        let lock = Lock::take(&settings.data)?;
+        Self::start(settings, store, lock, source, place).await
+    }
+
+    async fn start(
+        settings: Settings,
+        store: Arc<dyn Store>,
+        lock: Lock,
+        source: impl RigSource,
+        place: WorkerPlace,
+    ) -> Result<Self, DaemonError> {
         let rig = RigFile::parse(&settings.rig, settings.rig_name.as_ref())?;
         let now = humantime::format_rfc3339_millis((settings.clock)()).to_string();
         let life = store.begin_life(&now).await?;
-        let mut view = crate::view::unknown_rig(&rig);
-        view.fault = store.latched().await?;
+        let latched = store.latched().await?;
+        let view = watch::Sender::new(crate::view::unknown_rig(&rig));
+        let log = Arc::new(Log::new(life * EVENTS_PER_LIFE));
+        let operator = OperatorControl::open(
+            &settings.data,
+            || latched,
+            view.clone(),
+            log.clone(),
+            settings.clock,
+        );
         let shared = Arc::new(Shared {
+            audit: Audit::start(store.clone()),
             settings,
             store,
-            command: watch::Sender::new(Command::Run),
-            view: watch::Sender::new(view),
-            log: Arc::new(Log::new(life * EVENTS_PER_LIFE)),
+            operator,
+            view,
+            log,
+            holding: watch::Sender::new(false),
             unkept: Mutex::default(),
             rig,
         });
-        let (asks, asked) = mpsc::channel(ASKS);
-        let (news, told) = mpsc::unbounded_channel();
-        let hand = Hand::start(shared.clone(), news.clone())?;
-        let queue = Queue::open(shared.clone(), hand, lock).await?;
-        tokio::spawn(queue.run(asked, told));
-        Ok(Self { shared, asks, news })
+        let (requests, asked) = mpsc::channel(REQUESTS);
+        let (reported, events) = mpsc::channel(WORKER_EVENTS);
+        let worker = RigWorker::start(shared.clone(), source, place, reported)?;
+        let queue = Queue::open(shared.clone(), worker, lock).await?;
+        let (end, ended) = watch::channel(false);
+        tokio::spawn(queue.run(asked, events, end));
+        Ok(Self {
+            shared,
+            requests,
+            ended,
+        })
     }
 
     /// Queues a job.
@@ -96,9 +137,11 @@ impl Daemon {
     /// # Errors
     /// A job file that is wrong, or that this rig cannot do; too many waiting.
     pub async fn submit(&self, by: &Caller, submission: Submission) -> Result<Job, Refusal> {
+        let receipt = self.shared.operator.receive();
         let order = self.order(submission.job, submission.name).await?;
-        self.ask(by, |reply| Ask::Submit {
+        self.ask(by, |reply| Request::Submit {
             order: Box::new(order),
+            receipt,
             reply,
         })
         .await
@@ -119,7 +162,7 @@ impl Daemon {
     }
 
     /// Reads a job file and checks that this rig can do it.
-    async fn order(&self, job: String, name: String) -> Result<Order, Refusal> {
+    async fn order(&self, job: String, name: String) -> Result<RunRequest, Refusal> {
         if job.len() > JOB_BYTES {
             return Err(Refusal::new(
                 RefusalKind::Invalid,
@@ -128,7 +171,7 @@ impl Daemon {
         }
         let shared = self.shared.clone();
         blocking(move || {
-            let order = Order::parse(
+            let order = RunRequest::parse(
                 job,
                 &name,
                 shared.settings.rig.clone(),
@@ -165,7 +208,14 @@ impl Daemon {
     /// # Errors
     /// No such job; not in its state; a fault is latched, or the rig is busy.
     pub async fn act(&self, by: &Caller, id: JobId, action: Action) -> Result<Job, Refusal> {
-        self.ask(by, |reply| Ask::Act { id, action, reply }).await
+        let receipt = self.shared.operator.receive();
+        self.ask(by, |reply| Request::Act {
+            id,
+            action,
+            receipt,
+            reply,
+        })
+        .await
     }
 
     /// Finishes the reading and holds, lamp on.
@@ -173,7 +223,9 @@ impl Daemon {
     /// # Errors
     /// Nothing is under way.
     pub async fn pause(&self, by: &Caller) -> Result<(), Refusal> {
-        self.command(by, Verb::Pause, Command::Pause, |now| now == Command::Run)
+        let result = self.shared.operator.pause();
+        self.note(by, "pause", &result);
+        result
     }
 
     /// Goes on after a pause.
@@ -181,56 +233,66 @@ impl Daemon {
     /// # Errors
     /// Nothing is paused.
     pub async fn proceed(&self, by: &Caller) -> Result<(), Refusal> {
-        self.command(by, Verb::Proceed, Command::Run, |now| now == Command::Pause)
+        let result = self.shared.operator.proceed();
+        self.note(by, "go on", &result);
+        result
     }
 
-    /// Finishes the reading, holds the arms, lamp off, and ends the run; it can be resumed.
+    /// Finishes the reading, holds the arms, lamp off, and ends the run; it can be resumed. Holds the queue as
+    /// [`Self::stop`] does. Never refused.
     ///
     /// # Errors
-    /// Nothing is under way.
+    /// As [`Self::stop`].
     pub async fn finish(&self, by: &Caller) -> Result<(), Refusal> {
-        self.command(by, Verb::Finish, Command::Finish, |now| {
-            matches!(now, Command::Run | Command::Pause)
-        })
+        self.stop_by(by, "finish", Command::Finish).await
     }
 
-    /// Decelerates now on the profiles, holds, and ends the run; it can be resumed.
+    /// Decelerates now on the profiles, holds, and ends the run; it can be resumed. Nothing starts after it but what is
+    /// asked for after its answer, and no job starts by itself until an operator starts or resumes one. Never refused.
     ///
     /// # Errors
-    /// Nothing is under way.
+    /// The arms stop and the queue is held, but that could not be written to disk: it is forgotten when the program
+    /// ends.
     pub async fn stop(&self, by: &Caller) -> Result<(), Refusal> {
-        self.command(by, Verb::Stop, Command::Stop, |now| now != Command::Estop)
+        self.stop_by(by, "stop", Command::Stop).await
     }
 
-    /// Stops the arms at once as the rig file says, lamp off. Nothing moves until it is acknowledged, not after a
-    /// restart either. Never refused.
-    ///
-    /// # Errors
-    /// None.
-    pub async fn estop(&self, by: &Caller) -> Result<(), Refusal> {
-        self.shared.command.send_replace(Command::Estop);
-        self.say(by, Verb::Estop);
-        Ok(())
+    async fn stop_by(&self, by: &Caller, word: &str, command: Command) -> Result<(), Refusal> {
+        let result = self.shared.operator.stop(command).await.map_err(not_kept);
+        self.note(by, word, &result);
+        result
     }
 
-    /// Acknowledges the latched fault, so that the rig may move again. Nothing starts by that.
+    /// Stops the arms at once as the rig file says, lamp off. Nothing moves until it is acknowledged by the id that is
+    /// returned, not after a restart either. Every press has an id of its own. Never refused.
     ///
     /// # Errors
-    /// None is latched; the store cannot be written.
-    pub async fn acknowledge(&self, by: &Caller) -> Result<(), Refusal> {
-        self.ask(by, |reply| Ask::Acknowledge { reply }).await
+    /// The arms stop and the fault is latched, but that could not be written to disk: it is forgotten when the program
+    /// ends.
+    pub async fn estop(&self, by: &Caller) -> Result<FaultId, Refusal> {
+        let result = self.shared.operator.emergency_stop(by).await.map_err(not_kept);
+        self.note(by, "emergency stop", &result);
+        result
+    }
+
+    /// Acknowledges the newest latched fault by its id. The rig may move again once none is latched; nothing starts by
+    /// that.
+    ///
+    /// # Errors
+    /// None is latched; another one is newer, which the refusal has with it; the rig is still coming to rest.
+    pub async fn acknowledge(&self, by: &Caller, fault: &FaultId) -> Result<(), Refusal> {
+        let result = self.shared.operator.acknowledge(by, fault).await.map(drop);
+        self.note(by, &format!("acknowledge {fault}"), &result);
+        result
     }
 
     /// Moves one arm by hand; the other stays. Returns once the motion was checked and begins.
     ///
     /// # Errors
-    /// A job is under way, a fault is latched, the rig does not answer, the motion would leave the envelope.
+    /// A job is under way, a fault is latched, the rig does not answer, the motion would leave the envelope; the rig was
+    /// stopped since this was asked for.
     pub async fn jog(&self, by: &Caller, arm: Arm, angle: ArmAngle) -> Result<(), Refusal> {
-        self.ask(by, |reply| Ask::Move {
-            to: Some((arm, angle)),
-            reply,
-        })
-        .await
+        self.travel(by, Some((arm, angle))).await
     }
 
     /// Takes both arms to rest, where the rig file parks them. Returns once the motion was checked and begins.
@@ -238,7 +300,12 @@ impl Daemon {
     /// # Errors
     /// As [`Self::jog`].
     pub async fn park(&self, by: &Caller) -> Result<(), Refusal> {
-        self.ask(by, |reply| Ask::Move { to: None, reply }).await
+        self.travel(by, None).await
+    }
+
+    async fn travel(&self, by: &Caller, to: Option<(Arm, ArmAngle)>) -> Result<(), Refusal> {
+        let receipt = self.shared.operator.receive();
+        self.ask(by, |reply| Request::Move { to, receipt, reply }).await
     }
 
     /// Live picture of the rig.
@@ -308,76 +375,63 @@ impl Daemon {
 
     /// Ends the service: the reading is finished, the arms hold, the lamp is off, the state is saved.
     pub async fn shutdown(&self) {
-        let (reply, ended) = oneshot::channel();
-        if self.asks.send(Ask::Shutdown { reply }).await.is_ok() {
-            // An error means that it has ended already.
-            let _ = ended.await;
-        }
+        self.shared.operator.close();
+        // An error means that it has ended already.
+        let _ = self.ended.clone().wait_for(|&ended| ended).await;
     }
 
-    /// Gives the capture a command, where the present one allows it.
-    fn command(
-        &self,
-        by: &Caller,
-        verb: Verb,
-        command: Command,
-        allowed: impl Fn(Command) -> bool,
-    ) -> Result<(), Refusal> {
-        let (job, activity) = {
-            let view = self.shared.view.borrow();
-            (view.job, view.activity)
-        };
-        if job.is_none() && activity == Activity::Idle {
-            return Err(Refusal::conflict(format!(
-                "nothing is under way that could {verb}"
-            )));
-        }
-        let taken = self.shared.command.send_if_modified(|now| {
-            let may = allowed(*now);
-            if may {
-                *now = command;
-            }
-            may
-        });
-        if !taken {
-            let now = *self.shared.command.borrow();
-            return Err(Refusal::conflict(format!("cannot {verb}: {now:?} was asked for")));
-        }
-        self.say(by, verb);
-        Ok(())
+    /// Notes what somebody asked past the queue, without waiting for that.
+    fn note<T>(&self, by: &Caller, what: &str, result: &Result<T, Refusal>) {
+        note(&self.shared, by, what, result);
     }
 
-    /// Has a verb noted, without waiting for that.
-    fn say(&self, by: &Caller, verb: Verb) {
-        let said = News::Verb {
-            by: by.name.clone(),
-            verb,
-        };
-        // Nobody notes it any more once the queue has ended.
-        let _ = self.news.send(said);
-    }
-
-    async fn ask<T>(&self, by: &Caller, ask: impl FnOnce(Reply<T>) -> Ask) -> Result<T, Refusal> {
+    async fn ask<T>(&self, by: &Caller, request: impl FnOnce(Reply<T>) -> Request) -> Result<T, Refusal> {
         let (answer, answered) = oneshot::channel();
         let ended = || Refusal::unavailable("the daemon is shutting down");
         let reply = Reply {
             by: by.clone(),
             answer,
         };
-        self.asks.try_send(ask(reply)).map_err(|error| match error {
-            mpsc::error::TrySendError::Full(_) => {
-                Refusal::new(RefusalKind::Busy, "too many requests are waiting; try again")
-            }
-            mpsc::error::TrySendError::Closed(_) => ended(),
-        })?;
+        self.requests
+            .try_send(request(reply))
+            .map_err(|error| match error {
+                mpsc::error::TrySendError::Full(_) => {
+                    Refusal::new(RefusalKind::Busy, "too many requests are waiting; try again")
+                }
+                mpsc::error::TrySendError::Closed(_) => ended(),
+            })?;
         answered.await.map_err(|_| ended())?
     }
+}
+
+fn not_kept(NotKept(why): NotKept) -> Refusal {
+    Refusal::unavailable(format!(
+        "the arms stop and nothing moves until you say so, but only as long as the daemon runs: {why}"
+    ))
+}
+
+/// Notes in the audit what was asked and what came of it.
+fn note<T>(shared: &Shared, by: &Caller, what: &str, result: &Result<T, Refusal>) {
+    let outcome = match result {
+        Ok(_) => "done".to_owned(),
+        Err(refusal) => refusal.to_string(),
+    };
+    shared.audit.note(shared.now(), &by.name, what, &outcome);
 }
 
 /// Who asked, and where the answer goes.
 pub(crate) struct Reply<T> {
     pub(crate) by: Caller,
-    pub(crate) answer: oneshot::Sender<Result<T, Refusal>>,
+    answer: oneshot::Sender<Result<T, Refusal>>,
+}
+
+impl<T> Reply<T> {
+    /// Notes what was asked and what came of it, and answers.
+    pub(crate) fn send(self, shared: &Shared, what: &str, result: Result<T, Refusal>) {
+        note(shared, &self.by, what, &result);
+        // Whoever asked may have gone.
+        let _ = self.answer.send(result);
+    }
 }
 
 /// Writes a run directory from the records of its journal.

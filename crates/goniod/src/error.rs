@@ -59,7 +59,12 @@ pub enum DaemonError {
     },
     /// The devices are not all there, or not what the rig file says; nothing moved.
     #[error("the rig is not ready")]
-    NotReady(#[source] Box<rig::DriveError<rig::RigError>>),
+    NotReady {
+        /// Kind of the fault.
+        kind: FaultKind,
+        /// What failed.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
     /// The store cannot be opened, read or written.
     #[error(transparent)]
     Store(#[from] crate::StoreError),
@@ -78,6 +83,9 @@ pub enum DaemonError {
     /// A thread cannot be started.
     #[error("cannot start a thread for the rig")]
     Thread(#[source] io::Error),
+    /// The planning of a job ended without a plan.
+    #[error("the job could not be planned")]
+    Planning(#[source] tokio::task::JoinError),
     /// The journal cannot be opened, or not written any more.
     #[error(transparent)]
     Journal(#[from] capture::JournalError),
@@ -108,7 +116,7 @@ impl From<SessionError> for DaemonError {
             SessionError::Sim { file, source } => Self::Sim { file, source },
             SessionError::Uncertified { directory, why } => Self::Uncertified { directory, why },
             SessionError::Out { path, source } => Self::Out { path, source },
-            SessionError::NotReady(error) => Self::NotReady(error),
+            SessionError::NotReady { kind, source } => Self::NotReady { kind, source },
             SessionError::Journal(error) => Self::Journal(error),
             SessionError::Capture(error) => Self::Capture(error),
             SessionError::Report(error) => Self::Report(error),
@@ -124,7 +132,7 @@ impl DaemonError {
             return Status::Stopped;
         }
         match self {
-            Self::NotReady(error) => kind(error.kind()),
+            Self::NotReady { kind: fault, .. } => kind(*fault),
             Self::Rig(error) | Self::Port { source: error, .. } => kind(rig::Fault::kind(error.as_ref())),
             Self::Job(sweep::SweepError::Start { .. })
             | Self::Capture(capture::CaptureError::OtherDevices { .. }) => Status::Rig,

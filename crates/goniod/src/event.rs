@@ -36,7 +36,7 @@ impl Log {
     }
 
     /// Tells everyone.
-    pub(crate) fn tell(&self, at: String, what: What) {
+    pub(crate) fn publish(&self, at: String, what: What) {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let id = self.last.borrow().id + 1;
         if kept.len() == KEPT {
@@ -116,7 +116,7 @@ mod tests {
         let log = Arc::new(Log::new(100));
         let mut early = Events::new(log.clone(), None);
         for n in 0..3 {
-            log.tell(String::new(), warning(n));
+            log.publish(String::new(), warning(n));
         }
         assert_eq!(early.next().await.map(|event| event.id), Some(101));
         let mut back = Events::new(log.clone(), Some(102));
@@ -127,7 +127,7 @@ mod tests {
         assert_eq!((event.id, event.what), (100, What::Gap), "a life before");
         assert_eq!(old.next().await.map(|event| event.id), Some(101));
         for n in 0..KEPT {
-            log.tell(String::new(), warning(n));
+            log.publish(String::new(), warning(n));
         }
         let event = early.next().await.unwrap();
         assert_eq!(event.what, What::Gap, "too slow");

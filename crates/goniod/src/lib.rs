@@ -4,13 +4,14 @@
 //! through, and obeys an operator at once; [`http`] lets others use it. Front ends send commands and watch events; none
 //! of them drives. The crate `session` carries out a single run without it.
 
+mod audit;
 mod caller;
 mod daemon;
 mod error;
 mod event;
-mod hand;
 pub mod http;
 mod lock;
+mod operator;
 mod queue;
 mod rebuild;
 mod refusal;
@@ -18,10 +19,11 @@ mod service;
 mod shared;
 mod store;
 mod view;
+mod worker;
 
 pub use api::{
-    Action, Activity, ArmView, Event, FaultCode, FaultView, Job, JobId, JobState, LeftOutView, LightView,
-    PlanView, Progress, ReadingView, RigView, RunView, SweepView, What,
+    Action, Activity, ArmView, Event, FaultCode, FaultId, FaultView, Job, JobId, JobState, LeftOutView,
+    LightView, PlanView, Progress, ReadingView, RigView, RunView, SweepView, What,
 };
 pub use caller::{Caller, Submission};
 pub use daemon::{Daemon, Settings};
@@ -30,23 +32,6 @@ pub use event::Events;
 pub use rebuild::rebuild;
 pub use refusal::{Refusal, RefusalKind};
 pub use service::{command, main};
-pub use store::{Sqlite, Store, StoreError};
-
-use session::RunRequest as Order;
-
-/// The states of a job and what changes them.
-mod state {
-    pub(crate) use api::Cause;
-}
-
-/// How the rig is opened.
-mod station {
-    pub(crate) use session::OpenRig as Station;
-}
-
-/// How a run is carried out.
-mod run {
-    pub(crate) use session::{
-        extension_planner as ask, prepare_output as prepare, run_directory_name as name,
-    };
-}
+pub use session::{OpenRig, PortOfFile, RigSource};
+pub use store::{Behaviour, Memory, Sqlite, Store, StoreError};
+pub use worker::WorkerPlace;

@@ -1,34 +1,33 @@
 use std::sync::Arc;
 
-use capture::Command;
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::{mpsc, watch};
 
-use crate::hand::Task;
 use crate::lock::Lock;
+use crate::operator::{Permit, Signal};
 use crate::shared::Shared;
-use crate::state::Cause;
+use crate::worker::Task;
 use crate::{DaemonError, FaultCode, Job, JobId, JobState, Refusal, What};
+use api::Cause;
 
-mod ask;
-mod news;
+mod event;
+mod request;
 
-pub(crate) use ask::Ask;
-pub(crate) use news::{Ending, News, Verb};
+pub(crate) use event::{Ending, WorkerEvent};
+pub(crate) use request::Request;
 
 /// Owns the queue: which job is next, and how each stands.
 pub(crate) struct Queue {
     shared: Arc<Shared>,
-    hand: mpsc::Sender<Task>,
+    worker: mpsc::Sender<Task>,
     /// Jobs that are not over, in their order.
     jobs: Vec<Job>,
     current: Option<JobId>,
     /// Whether an arm is moved by hand.
     moving: bool,
-    /// Whether no job may start that nobody said anything about since the program began.
-    held: bool,
-    closing: bool,
-    /// Whom to tell once it has ended.
-    closed: Vec<oneshot::Sender<()>>,
+    /// What the operator does.
+    signal: watch::Receiver<Signal>,
+    /// Whether the capture holds, on the operator's wish.
+    holding: watch::Receiver<bool>,
     _lock: Lock,
 }
 
@@ -39,7 +38,7 @@ impl Queue {
     /// The store cannot be read or written.
     pub(crate) async fn open(
         shared: Arc<Shared>,
-        hand: mpsc::Sender<Task>,
+        worker: mpsc::Sender<Task>,
         lock: Lock,
     ) -> Result<Self, DaemonError> {
         let mut jobs = shared.store.jobs(0).await?;
@@ -53,116 +52,87 @@ impl Queue {
             shared.store.change_job(job).await?;
         }
         Ok(Self {
-            held: !jobs.is_empty(),
+            signal: shared.operator.subscribe(),
+            holding: shared.holding.subscribe(),
             shared,
-            hand,
+            worker,
             jobs,
             current: None,
             moving: false,
-            closing: false,
-            closed: Vec::new(),
             _lock: lock,
         })
     }
 
-    /// Answers and listens until it is told to end.
+    /// Answers and listens until it is to end.
     pub(crate) async fn run(
         mut self,
-        mut asks: mpsc::Receiver<Ask>,
-        mut news: mpsc::UnboundedReceiver<News>,
+        mut requests: mpsc::Receiver<Request>,
+        mut events: mpsc::Receiver<WorkerEvent>,
+        ended: watch::Sender<bool>,
     ) {
         let mut orphaned = false;
         loop {
-            if self.closing && self.current.is_none() && !self.moving {
+            let signal = *self.signal.borrow_and_update();
+            if signal.closing && self.current.is_none() && !self.moving {
                 break;
             }
-            self.next().await;
+            self.follow(signal).await;
+            self.take_turn().await;
             tokio::select! {
                 biased;
-                Some(news) = news.recv() => self.hear(news).await,
-                ask = asks.recv(), if !orphaned => match ask {
-                    Some(ask) => self.answer(ask).await,
+                Some(event) = events.recv() => self.handle(event).await,
+                _ = self.signal.changed() => {}
+                _ = self.holding.changed() => {}
+                request = requests.recv(), if !orphaned && !signal.closing => match request {
+                    Some(request) => self.answer(request).await,
                     // The last handle was dropped without a word.
                     None => {
                         orphaned = true;
-                        self.end();
+                        self.shared.operator.close();
                     }
                 },
-                else => break,
             }
         }
-        let (reply, closed) = oneshot::channel();
-        if self.hand.send(Task::Close { reply }).await.is_ok() {
-            let _ = closed.await;
+        // Whoever still waits for an answer is told that the daemon has ended.
+        drop(requests);
+        if self.worker.send(Task::Close).await.is_ok() {
+            self.worker.closed().await;
         }
+        self.shared.audit.close().await;
+        // An error was logged when it came up.
+        let _ = self.shared.operator.kept().await;
         self.shared.store.close().await;
         self.shared.log.close();
-        for reply in self.closed {
-            let _ = reply.send(());
+        drop(self._lock);
+        ended.send_replace(true);
+    }
+
+    /// Brings the first waiting job forward. It starts only once somebody says that its specimen is on the stage.
+    async fn take_turn(&mut self) {
+        if self.current.is_some() || self.signal.borrow().closing {
+            return;
+        }
+        let waiting = |job: &&Job| matches!(job.state, JobState::Queued | JobState::AwaitingSpecimen);
+        if let Some(job) = self.jobs.iter().find(waiting)
+            && job.state == JobState::Queued
+        {
+            self.change(job.id, Cause::Turn, None).await;
         }
     }
 
-    /// Has the reading finished and the capture ended.
-    fn end(&mut self) {
-        self.closing = true;
-        self.shared.command.send_if_modified(|command| {
-            let end = matches!(command, Command::Run | Command::Pause);
-            if end {
-                *command = Command::Finish;
-            }
-            end
-        });
-    }
-
-    /// Brings the next job forward, where nothing stands in the way.
-    async fn next(&mut self) {
-        self.held &= !self.jobs.is_empty();
-        if self.current.is_some() || self.closing {
-            return;
-        }
-        let ahead = |job: &&Job| matches!(job.state, JobState::Queued | JobState::AwaitingSpecimen);
-        let Some(job) = self.jobs.iter().find(ahead) else {
-            return;
-        };
-        let (id, on_stage) = (job.id, job.on_stage);
-        if job.state == JobState::AwaitingSpecimen {
-            return;
-        }
-        let interrupted = self.jobs.iter().any(|job| job.state == JobState::Interrupted);
-        // What an operator asked for while one job ended must not be lost on the next.
-        let told = *self.shared.command.borrow() != Command::Run;
-        if !on_stage || self.held || interrupted || told {
-            self.change(id, Cause::Turn, None).await;
-        } else if self.free().is_ok() {
-            self.set_off(id, Cause::Start).await;
-        }
-    }
-
-    /// Whether a motion may begin.
+    /// Whether a job could begin, were it not for the operator.
     fn free(&self) -> Result<(), Refusal> {
-        if let Some(fault) = self.shared.fault() {
-            return Err(Refusal::conflict(format!(
-                "a fault is latched ({}): acknowledge it first",
-                fault.text
-            )));
-        }
-        if *self.shared.command.borrow() == Command::Estop {
-            return Err(Refusal::conflict("the emergency stop is not acknowledged"));
-        }
         if let Some(id) = self.current {
             return Err(Refusal::conflict(format!("job {id} is under way")));
         }
         if self.moving {
             return Err(Refusal::conflict("the arms are being moved by hand"));
         }
-        if self.closing {
-            return Err(Refusal::unavailable("the daemon is shutting down"));
-        }
         Ok(())
     }
 
     /// Hands a job to the rig.
-    async fn set_off(&mut self, id: JobId, cause: Cause) {
+    async fn start(&mut self, id: JobId, cause: Cause, permit: Permit) {
         self.change(id, cause, None).await;
         let Some(job) = self.jobs.iter().find(|job| job.id == id).cloned() else {
             return;
@@ -173,22 +143,15 @@ impl Queue {
             view.run.clone_from(&job.run);
             view.progress = None;
         });
-        if self.hand.send(Task::Carry(Box::new(job))).await.is_err() {
+        let task = Task::RunJob {
+            job: Box::new(job),
+            permit,
+        };
+        if self.worker.send(task).await.is_err() {
             let why = "the thread of the rig has ended; restart the daemon".to_owned();
-            let fault = Some(FaultCode::Setup);
-            self.ended(Ending::Interrupted { why, fault }).await;
+            self.shared.operator.latch(FaultCode::Setup, why.clone());
+            self.end_job(Ending::Interrupted { why }).await;
         }
-    }
-
-    /// Takes back what was asked of the motion before; an emergency stop stays.
-    fn clear_command(&self) {
-        self.shared.command.send_if_modified(|command| {
-            let stale = !matches!(command, Command::Estop | Command::Run);
-            if stale {
-                *command = Command::Run;
-            }
-            stale
-        });
     }
 
     /// Changes a job's state, where the table allows it.
@@ -196,7 +159,7 @@ impl Queue {
         let Some(job) = self.jobs.iter_mut().find(|job| job.id == id) else {
             return;
         };
-        let Some(state) = job.state.after(cause) else {
+        let Some(state) = job.state.after(cause).filter(|&state| state != job.state) else {
             return;
         };
         job.state = state;
@@ -207,7 +170,7 @@ impl Queue {
             self.jobs.retain(|job| job.id != id);
         }
         self.shared.keep(&changed).await;
-        self.shared.tell(What::Job {
+        self.shared.publish(What::Job {
             job: Box::new(changed),
         });
     }

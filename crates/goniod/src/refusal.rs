@@ -1,4 +1,4 @@
-use crate::StoreError;
+use crate::{FaultId, FaultView, StoreError};
 
 /// What kind of refusal, for whoever must act on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +24,8 @@ pub struct Refusal {
     pub kind: RefusalKind,
     /// In words, with what is allowed.
     pub why: String,
+    /// The fault that is newer than the one that was to be acknowledged.
+    pub newer: Option<Box<FaultView>>,
 }
 
 impl Refusal {
@@ -31,6 +33,18 @@ impl Refusal {
         Self {
             kind,
             why: why.into(),
+            newer: None,
+        }
+    }
+
+    /// Another fault than `named` is the newest one.
+    pub(crate) fn newer_fault(named: &FaultId, newest: FaultView) -> Self {
+        Self {
+            newer: Some(Box::new(newest.clone())),
+            ..Self::conflict(format!(
+                "fault {named} is not the newest: fault {} is ({}); look at the rig again",
+                newest.id, newest.text
+            ))
         }
     }
 

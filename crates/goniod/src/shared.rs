@@ -3,21 +3,25 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::SystemTime;
 
-use capture::Command;
 use rig::RigFile;
 use tokio::sync::watch;
 
+use crate::audit::Audit;
 use crate::event::Log;
+use crate::operator::OperatorControl;
 use crate::refusal::chain;
-use crate::{Activity, FaultView, Job, JobId, RigView, Settings, Store, What};
+use crate::{Activity, Job, JobId, RigView, Settings, Store, What};
 
-/// What the handles, the queue and the hand share: all of it can be read or told at once, nothing waits.
+/// What the handles, the queue and the worker share: all of it can be read or written at once, nothing waits.
 pub(crate) struct Shared {
     pub(crate) settings: Settings,
     pub(crate) rig: RigFile,
     pub(crate) store: Arc<dyn Store>,
-    /// What the operator wants of the capture; straight to it, past everything else.
-    pub(crate) command: watch::Sender<Command>,
+    /// What the operator said last; straight to what moves, past everything else.
+    pub(crate) operator: Arc<OperatorControl>,
+    pub(crate) audit: Audit,
+    /// Whether the capture holds, on the operator's wish.
+    pub(crate) holding: watch::Sender<bool>,
     pub(crate) view: watch::Sender<RigView>,
     pub(crate) log: Arc<Log>,
     /// Jobs as they are, where the store refused to keep how they changed.
@@ -38,13 +42,13 @@ impl Shared {
         self.settings.data.join("runs")
     }
 
-    pub(crate) fn tell(&self, what: What) {
-        self.log.tell(self.now(), what);
+    pub(crate) fn publish(&self, what: What) {
+        self.log.publish(self.now(), what);
     }
 
     pub(crate) fn warn(&self, text: String) {
         tracing::warn!("{text}");
-        self.tell(What::Warning { text });
+        self.publish(What::Warning { text });
     }
 
     /// Keeps how a job changed. A store that refuses is a warning: what the rig does is true all the same, and after a
@@ -80,11 +84,7 @@ impl Shared {
             changed
         });
         if changed {
-            self.tell(What::Activity { activity });
+            self.publish(What::Activity { activity });
         }
-    }
-
-    pub(crate) fn fault(&self) -> Option<FaultView> {
-        self.view.borrow().fault.clone()
     }
 }

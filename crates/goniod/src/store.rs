@@ -6,12 +6,14 @@ use capture::Record;
 use crate::{FaultCode, FaultView, Job, JobId, RunView};
 
 mod journal;
+mod memory;
 mod sqlite;
 
 pub(crate) use journal::StoreJournal;
+pub use memory::{Behaviour, Memory};
 pub use sqlite::Sqlite;
 
-/// Where everything is kept that must outlive the program: jobs, runs, their journals, faults, and who asked what.
+/// Where everything is kept that must outlive the program: jobs, runs, their journals, and who asked what.
 ///
 /// What a method has returned from is durable. One daemon writes at a time.
 #[async_trait]
@@ -87,23 +89,12 @@ pub trait Store: Send + Sync + 'static {
     /// The medium refused, or what it holds is no record.
     async fn records(&self, run: &str) -> Result<Vec<Record>, StoreError>;
 
-    /// Latches a fault.
-    ///
-    /// # Errors
-    /// The medium refused.
-    async fn latch(&self, fault: &FaultView) -> Result<(), StoreError>;
-
-    /// The latest fault that nobody has acknowledged.
+    /// The latest fault that nobody has acknowledged, in a store of an earlier version: faults have a file of their own
+    /// since.
     ///
     /// # Errors
     /// The medium refused, or what it holds is no fault.
     async fn latched(&self) -> Result<Option<FaultView>, StoreError>;
-
-    /// Acknowledges all latched faults.
-    ///
-    /// # Errors
-    /// The medium refused.
-    async fn acknowledge(&self, by: &str, at: &str) -> Result<(), StoreError>;
 
     /// Notes who asked what, and what came of it.
     ///
@@ -142,6 +133,12 @@ pub enum StoreError {
         what: &'static str,
         /// Why.
         source: sqlx::Error,
+    },
+    /// The medium refuses everything.
+    #[error("cannot {what} in the store: it refuses everything")]
+    Unavailable {
+        /// What was attempted.
+        what: &'static str,
     },
     /// It holds something that this version cannot read.
     #[error("the store holds a {what} that cannot be read: {why}")]

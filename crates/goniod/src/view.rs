@@ -56,6 +56,7 @@ pub(crate) fn unknown_rig(rig: &RigFile) -> RigView {
         lamp_monitor: None,
         temperature_c: None,
         fault: None,
+        queue_held: None,
         job: None,
         run: None,
         progress: None,

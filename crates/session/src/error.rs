@@ -59,7 +59,12 @@ pub enum SessionError {
     },
     /// The devices are not all there, or not what the rig file says; nothing moved.
     #[error("the rig is not ready")]
-    NotReady(#[source] Box<rig::DriveError<rig::RigError>>),
+    NotReady {
+        /// Kind of the fault.
+        kind: FaultKind,
+        /// What failed.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
     /// The journal cannot be opened, or not written any more.
     #[error(transparent)]
     Journal(#[from] capture::JournalError),
@@ -84,7 +89,7 @@ impl SessionError {
             return Status::Stopped;
         }
         match self {
-            Self::NotReady(error) => kind(error.kind()),
+            Self::NotReady { kind: fault, .. } => kind(*fault),
             Self::Rig(error) | Self::Port { source: error, .. } => kind(rig::Fault::kind(error.as_ref())),
             Self::Job(sweep::SweepError::Start { .. })
             | Self::Capture(capture::CaptureError::OtherDevices { .. }) => Status::Rig,

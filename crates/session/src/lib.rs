@@ -18,7 +18,7 @@ pub use calibrate::{Calibrated, Calibration};
 pub use certificates::Certificates;
 pub use directions::job_text;
 pub use error::SessionError;
-pub use open_rig::OpenRig;
+pub use open_rig::{OpenRig, PortOfFile, RigSource};
 pub use rig_port::RigPort;
 pub use run::{Ended, extension_planner, prepare_output, resume, run, run_directory_name};
 pub use run_request::{RunRequest, rig_file, rig_text};

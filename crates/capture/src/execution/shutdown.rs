@@ -1,5 +1,6 @@
-use rig::{Device, DriveError, FaultKind, Rig};
+use rig::{Device, Drive, DriveError, FaultKind, Rig};
 use sweep::SweepError;
+use tokio::sync::watch;
 
 use super::{Execution, now};
 use crate::{CaptureError, Command, Event, JournalError, Outcome, Record};
@@ -52,18 +53,20 @@ impl<R: Rig> Execution<'_, R> {
         let mut unsafe_left = match result {
             _ if !self.touched => Vec::new(),
             _ if at_rest => self.drive.disengage_all().await,
-            Err(Interrupt::Estop) => self.arrest(true).await,
-            _ => self.arrest(false).await,
+            Err(Interrupt::Estop) => self.make_safe(true).await,
+            _ => self.make_safe(false).await,
         };
+        self.emit(Event::Safe);
         // An emergency stop that comes while it shuts down is one all the same.
-        let late = matches!(result, Ok(()) | Err(Interrupt::Finish | Interrupt::Stop))
-            && *self.control.borrow() == Command::Estop;
-        let result = match late {
-            true => {
-                unsafe_left.extend(self.arrest(true).await);
-                Err(Interrupt::Estop)
-            }
-            false => result,
+        let mut halted = matches!(result, Err(Interrupt::Estop));
+        let late = !halted && *self.control.borrow() == Command::Estop;
+        if late {
+            unsafe_left.extend(self.make_safe(true).await);
+            halted = true;
+        }
+        let result = match result {
+            Ok(()) | Err(Interrupt::Finish | Interrupt::Stop) if late => Err(Interrupt::Estop),
+            result => result,
         };
         for error in &unsafe_left {
             tracing::warn!("while shutting down: {}", chain(error));
@@ -95,15 +98,37 @@ impl<R: Rig> Execution<'_, R> {
         let device_ticks = device_ticks.map(|ticks| self.clock.unwrap(ticks));
         // What a flight saw that did not land counts for nothing, and is kept.
         for reading in std::mem::take(&mut self.aloft) {
-            self.journal.append(&Record::Reading(reading)).await?;
+            self.append_at_rest(&Record::Reading(reading), &mut halted)
+                .await?;
         }
         let end = Record::End {
             outcome: outcome.clone(),
             device_ticks,
             at: now(),
         };
-        self.journal.append(&end).await?;
+        self.append_at_rest(&end, &mut halted).await?;
         Ok(outcome)
+    }
+
+    /// Makes a record durable once the rig is safe. However long that takes, an emergency stop is carried out meanwhile,
+    /// unless the arms were `halted` by one before.
+    async fn append_at_rest(&mut self, record: &Record, halted: &mut bool) -> Result<(), JournalError> {
+        let mut control = self.control.clone();
+        let mut append = self.journal.append(record);
+        loop {
+            tokio::select! {
+                biased;
+                result = &mut append => return result,
+                () = emergency_stop(&mut control), if !*halted => {
+                    *halted = true;
+                    if self.touched {
+                        for error in stop_arms(self.drive, true).await {
+                            tracing::warn!("while stopping: {}", chain(&error));
+                        }
+                    }
+                }
+            }
+        }
     }
 
     fn tell_fault(&mut self, kind: FaultKind, device: Option<Device>, fault: String) {
@@ -112,23 +137,49 @@ impl<R: Rig> Execution<'_, R> {
 
     /// Makes the rig safe after a panic; the journal is left as it is.
     pub(crate) async fn abandon(mut self) {
-        for error in self.arrest(false).await {
+        for error in self.make_safe(false).await {
             tracing::warn!("while shutting down: {}", chain(&error));
         }
     }
 
-    /// Stops the arms, on their profiles or at once, lamp off, and lets go of them.
-    async fn arrest(&mut self, at_once: bool) -> Vec<DriveError<R::Error>> {
+    /// Stops the arms, on their profiles or at once, lamp off, and lets go of them. An emergency stop that comes while
+    /// they are told to brake is not kept waiting by a device that is silent.
+    async fn make_safe(&mut self, at_once: bool) -> Vec<DriveError<R::Error>> {
         if !self.touched {
             return Vec::new();
         }
-        let mut failed = match at_once {
-            true => self.drive.halt_all().await,
-            false => self.drive.stop_all().await,
-        };
-        failed.extend(self.drive.disengage_all().await);
-        failed
+        let mut control = self.control.clone();
+        if !at_once {
+            tokio::select! {
+                biased;
+                failed = stop_arms(self.drive, false) => return failed,
+                () = emergency_stop(&mut control) => {}
+            }
+        }
+        stop_arms(self.drive, true).await
     }
+}
+
+/// Returns once the emergency stop is asked for.
+async fn emergency_stop(control: &mut watch::Receiver<Command>) {
+    let pressed = control
+        .wait_for(|command| *command == Command::Estop)
+        .await
+        .is_ok();
+    if !pressed {
+        // Nobody is left who could ask.
+        std::future::pending().await
+    }
+}
+
+/// Stops the arms, on their profiles or at once, lamp off, and lets go of them. Returns what failed.
+async fn stop_arms<R: Rig>(drive: &mut Drive<R>, at_once: bool) -> Vec<DriveError<R::Error>> {
+    let mut failed = match at_once {
+        true => drive.halt_all().await,
+        false => drive.stop_all().await,
+    };
+    failed.extend(drive.disengage_all().await);
+    failed
 }
 
 /// An error with its causes.

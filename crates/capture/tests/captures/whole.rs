@@ -244,6 +244,7 @@ async fn events_tell_the_story_in_order() {
                 Event::Reading { .. } => "reading".to_owned(),
                 Event::Repeat { .. } => "repeat".to_owned(),
                 Event::Suspended { .. } => "suspended".to_owned(),
+                Event::Safe => "Safe".to_owned(),
                 Event::Fault { .. } => "fault".to_owned(),
                 Event::Progress { .. } => "progress".to_owned(),
             });
@@ -262,7 +263,8 @@ async fn events_tell_the_story_in_order() {
             "Running",
             "WarmingUp",
             "Running",
-            "ShuttingDown"
+            "ShuttingDown",
+            "Safe"
         ]
     );
     let count = |of: &str| told.iter().filter(|what| *what == of).count();

@@ -4,7 +4,7 @@ use axum::response::{IntoResponse, Response};
 use serde::Serialize;
 use utoipa::ToSchema;
 
-use crate::{Refusal, RefusalKind};
+use crate::{FaultView, Refusal, RefusalKind};
 
 /// Media type of a problem document.
 pub(crate) const MEDIA_TYPE: &str = "application/problem+json";
@@ -22,6 +22,9 @@ pub(crate) struct Problem {
     status: u16,
     /// What was wrong, where, and what is allowed.
     detail: String,
+    /// The newest latched fault, where another one was to be acknowledged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fault: Option<Box<FaultView>>,
 }
 
 impl Problem {
@@ -32,6 +35,7 @@ impl Problem {
             title: status.canonical_reason().unwrap_or("Error").to_owned(),
             status: status.as_u16(),
             detail: detail.into(),
+            fault: None,
         }
     }
 
@@ -64,7 +68,10 @@ impl From<Refusal> for Problem {
             RefusalKind::Busy => StatusCode::TOO_MANY_REQUESTS,
             RefusalKind::Unavailable => StatusCode::SERVICE_UNAVAILABLE,
         };
-        Self::new(status, refusal.why)
+        Self {
+            fault: refusal.newer,
+            ..Self::new(status, refusal.why)
+        }
     }
 }
 

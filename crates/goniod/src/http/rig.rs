@@ -1,4 +1,4 @@
-use api::{ArmName, Jog};
+use api::{Acknowledgement, ArmName, Jog};
 use arms::{Arm, ArmAngle};
 use axum::body::Bytes;
 use axum::extract::State;
@@ -59,34 +59,41 @@ async fn proceed(State(shared): State<Shared>, Extension(by): Extension<Caller>)
     Ok(DONE)
 }
 
-/// Finish the reading, then end; the run can be resumed.
-#[utoipa::path(post, path = "/finish", tag = "rig", responses((status = 204, description = "Asked for"),
-    (status = 409, body = Problem, content_type = "application/problem+json", description = "Nothing runs")))]
+/// Finish the reading, then end; the run can be resumed. Nothing starts until an operator starts or resumes a job.
+#[utoipa::path(post, path = "/finish", tag = "rig", responses((status = 204, description = "Asked for; the queue is held, also after a restart"),
+    (status = 503, body = Problem, content_type = "application/problem+json", description = "Asked for, but the queue is held only as long as the daemon runs: the disk refuses")))]
 async fn finish(State(shared): State<Shared>, Extension(by): Extension<Caller>) -> Done {
     shared.daemon.finish(&by).await?;
     Ok(DONE)
 }
 
-/// Brake now; the run can be resumed.
-#[utoipa::path(post, path = "/stop", tag = "rig", responses((status = 204, description = "Asked for"),
-    (status = 409, body = Problem, content_type = "application/problem+json", description = "Nothing runs")))]
+/// Brake now; the run can be resumed. Nothing starts until an operator starts or resumes a job. Never refused.
+#[utoipa::path(post, path = "/stop", tag = "rig", responses((status = 204, description = "The arms were told to stop; the queue is held, also after a restart"),
+    (status = 503, body = Problem, content_type = "application/problem+json", description = "The arms stop, but the queue is held only as long as the daemon runs: the disk refuses")))]
 async fn stop(State(shared): State<Shared>, Extension(by): Extension<Caller>) -> Done {
     shared.daemon.stop(&by).await?;
     Ok(DONE)
 }
 
-/// Emergency stop: arms and lamp at once, and no motion until it is acknowledged.
-#[utoipa::path(post, path = "/estop", tag = "rig", responses((status = 204, description = "Latched")))]
+/// Emergency stop: arms and lamp at once, and no motion until it is acknowledged by its id, which GET /rig shows.
+#[utoipa::path(post, path = "/estop", tag = "rig", responses((status = 204, description = "Latched, also for a restart"),
+    (status = 503, body = Problem, content_type = "application/problem+json", description = "Latched, but only as long as the daemon runs: the disk refuses")))]
 async fn estop(State(shared): State<Shared>, Extension(by): Extension<Caller>) -> Done {
     shared.daemon.estop(&by).await?;
     Ok(DONE)
 }
 
-/// Acknowledge the latched fault: somebody has looked at the rig.
-#[utoipa::path(post, path = "/acknowledge", tag = "rig", responses((status = 204, description = "Acknowledged"),
-    (status = 409, body = Problem, content_type = "application/problem+json", description = "There is no fault")))]
-async fn acknowledge(State(shared): State<Shared>, Extension(by): Extension<Caller>) -> Done {
-    shared.daemon.acknowledge(&by).await?;
+/// Acknowledge the newest latched fault by its id: somebody has looked at the rig. Starts nothing.
+#[utoipa::path(post, path = "/acknowledge", tag = "rig", request_body = Acknowledgement, responses((status = 204, description = "Acknowledged"),
+    (status = 409, body = Problem, content_type = "application/problem+json", description = "No fault is latched, another one is newer (`fault`), or the rig is still coming to rest")))]
+async fn acknowledge(
+    State(shared): State<Shared>,
+    Extension(by): Extension<Caller>,
+    headers: HeaderMap,
+    text: Bytes,
+) -> Done {
+    let Acknowledgement { fault } = body::json(&headers, &text)?;
+    shared.daemon.acknowledge(&by, &fault).await?;
     Ok(DONE)
 }
 

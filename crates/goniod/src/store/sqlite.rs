@@ -11,7 +11,7 @@ use sqlx::sqlite::{
 };
 
 use super::{Store, StoreError};
-use crate::{FaultView, Job, JobId, RunView};
+use crate::{FaultId, FaultView, Job, JobId, RunView};
 
 mod row;
 #[cfg(test)]
@@ -278,21 +278,6 @@ impl Store for Sqlite {
         rows.iter().map(record).collect()
     }
 
-    async fn latch(&self, fault: &FaultView) -> Result<(), StoreError> {
-        sqlx::query(
-            "INSERT INTO faults (seq, code, what, at, run) VALUES ((SELECT COALESCE(MAX(seq), 0) + 1 FROM faults), \
-             $1, $2, $3, $4)",
-        )
-        .bind(word(&fault.code))
-        .bind(&fault.text)
-        .bind(&fault.at)
-        .bind(&fault.run)
-        .execute(&self.writer)
-        .await
-        .map_err(failed("latch a fault"))?;
-        Ok(())
-    }
-
     async fn latched(&self) -> Result<Option<FaultView>, StoreError> {
         let row = sqlx::query("SELECT * FROM faults WHERE acknowledged IS NULL ORDER BY seq DESC LIMIT 1")
             .fetch_optional(&self.reader)
@@ -300,6 +285,7 @@ impl Store for Sqlite {
             .map_err(failed("look up faults"))?;
         let fault = |row: &SqliteRow| {
             Ok(FaultView {
+                id: FaultId::generate(),
                 code: of_word(&column::<String>(row, "code")?, "fault")?,
                 text: column(row, "what")?,
                 at: column(row, "at")?,
@@ -307,16 +293,6 @@ impl Store for Sqlite {
             })
         };
         row.as_ref().map(fault).transpose()
-    }
-
-    async fn acknowledge(&self, by: &str, at: &str) -> Result<(), StoreError> {
-        sqlx::query("UPDATE faults SET acknowledged = $1, acknowledged_by = $2 WHERE acknowledged IS NULL")
-            .bind(at)
-            .bind(by)
-            .execute(&self.writer)
-            .await
-            .map_err(failed("acknowledge a fault"))?;
-        Ok(())
     }
 
     async fn audit(&self, at: &str, who: &str, what: &str, outcome: &str) -> Result<(), StoreError> {

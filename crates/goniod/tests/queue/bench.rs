@@ -103,3 +103,12 @@ pub(crate) async fn rig(daemon: &Daemon, wanted: impl FnMut(&RigView) -> bool) -
 pub(crate) async fn idle(daemon: &Daemon) -> RigView {
     rig(daemon, |rig| rig.activity == Activity::Idle && rig.job.is_none()).await
 }
+
+/// Acknowledges the fault that is shown.
+///
+/// # Panics
+/// If none is, or that is refused.
+pub(crate) async fn acknowledge(daemon: &Daemon) {
+    let fault = daemon.rig().borrow().fault.clone().expect("a fault is latched");
+    daemon.acknowledge(&operator(), &fault.id).await.unwrap();
+}

@@ -7,7 +7,7 @@ use goniod::{Action, Daemon, Events, FaultCode, FaultView, Job, JobState, Settin
 use rig::RigFile;
 use sqlx::{Connection, SqliteConnection};
 
-use crate::bench::{Bench, idle, on_stage, operator, readings, rig, state, submission};
+use crate::bench::{Bench, SHORT, acknowledge, idle, on_stage, operator, readings, rig, state, submission};
 
 /// Real time, so that there is time for a mishap.
 const REAL: &str = "sim.clock = \"real\"\n";
@@ -21,7 +21,7 @@ async fn interrupted(daemon: &Daemon, events: &mut Events, job: &Job) -> FaultVi
 /// Acknowledges and goes on; every step must be there once in the end.
 async fn finish(daemon: &Daemon, events: &mut Events, job: &Job) {
     if daemon.rig().borrow().fault.is_some() {
-        daemon.acknowledge(&operator()).await.unwrap();
+        acknowledge(daemon).await;
     }
     daemon.act(&operator(), job.id, Action::Resume).await.unwrap();
     let done = state(events, job.id, JobState::Done).await;
@@ -111,7 +111,11 @@ async fn a_database_that_another_program_locks() {
     };
     let daemon = bench.open().await;
     let mut events = daemon.events(None);
-    // The fault could not be stored and is forgotten; the run is interrupted all the same.
+    // The fault is latched still, since it has a file of its own.
+    assert_eq!(
+        daemon.rig().borrow().fault.as_ref().map(|fault| fault.code),
+        Some(FaultCode::StoreLocked)
+    );
     finish(&daemon, &mut events, &job).await;
     daemon.shutdown().await;
 }
@@ -164,9 +168,11 @@ async fn a_clock_that_steps_back_changes_no_order() {
     let first = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
     readings(&mut events, 5).await;
     BACK_S.store(24 * 3600, Ordering::Relaxed);
-    let second = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    let second = daemon.submit(&operator(), submission(SHORT)).await.unwrap();
     assert!(second.submitted < first.submitted && second.place > first.place);
     state(&mut events, first.id, JobState::Done).await;
+    state(&mut events, second.id, JobState::AwaitingSpecimen).await;
+    daemon.act(&operator(), second.id, Action::Ready).await.unwrap();
     state(&mut events, second.id, JobState::Done).await;
     let last = daemon.events(Some(0)).next().await.unwrap().id;
     daemon.shutdown().await;

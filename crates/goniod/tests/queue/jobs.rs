@@ -49,15 +49,21 @@ async fn a_job_waits_for_its_specimen_and_leaves_a_whole_run() {
 }
 
 #[tokio::test]
-async fn jobs_whose_specimen_lies_there_follow_each_other() {
+async fn that_a_specimen_is_on_the_stage_holds_for_the_stage_as_it_was() {
     let bench = Bench::new("");
     let daemon = bench.open().await;
     let mut events = daemon.events(None);
     let first = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    // Said while another specimen lies there: somebody is asked once it may have been exchanged, or not.
     let second = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
     state(&mut events, first.id, JobState::Done).await;
+    state(&mut events, second.id, JobState::AwaitingSpecimen).await;
+    assert_eq!(daemon.runs().await.unwrap().len(), 1);
+    daemon.act(&operator(), second.id, Action::Ready).await.unwrap();
     state(&mut events, second.id, JobState::Done).await;
-    assert_eq!(daemon.runs().await.unwrap().len(), 2);
+    // Said of an empty queue it holds at once.
+    let third = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    state(&mut events, third.id, JobState::Done).await;
     daemon.shutdown().await;
 }
 

@@ -1,7 +1,9 @@
 use arms::{Arm, ArmAngle};
 use goniod::{Action, Activity, FaultCode, JobState, RefusalKind, What};
 
-use crate::bench::{Bench, SHORT, idle, on_stage, operator, readings, rig, state, submission, until};
+use crate::bench::{
+    Bench, SHORT, acknowledge, idle, on_stage, operator, readings, rig, state, submission, until,
+};
 
 /// Real time, so that there is time to press something.
 const REAL: &str = "sim.clock = \"real\"\n";
@@ -11,10 +13,14 @@ async fn a_stop_ends_at_once_and_the_run_goes_on_where_it_was() {
     let bench = Bench::new(REAL);
     let daemon = bench.open().await;
     let by = operator();
-    let refusal = daemon.stop(&by).await.unwrap_err();
-    assert_eq!(refusal.kind, RefusalKind::Conflict, "nothing to stop: {refusal}");
+    // Pressed between two jobs it holds the next one, until an operator starts it.
+    daemon.stop(&by).await.unwrap();
     let mut events = daemon.events(None);
     let job = daemon.submit(&by, submission(&on_stage())).await.unwrap();
+    state(&mut events, job.id, JobState::AwaitingSpecimen).await;
+    assert!(daemon.rig().borrow().queue_held.is_some());
+    daemon.act(&by, job.id, Action::Ready).await.unwrap();
+    assert_eq!(daemon.rig().borrow().queue_held, None);
     rig(&daemon, |rig| rig.arms[0].moving).await;
     daemon.stop(&by).await.unwrap();
     let stopped = state(&mut events, job.id, JobState::Interrupted).await;
@@ -89,13 +95,13 @@ async fn an_emergency_stop_is_latched_until_acknowledged_also_by_a_restart() {
         assert!(refusal.why.contains("acknowledge"), "{refusal}");
     }
     let mut events = daemon.events(None);
-    daemon.acknowledge(&by).await.unwrap();
+    acknowledge(&daemon).await;
     until(&mut events, |event| {
         matches!(event.what, What::Acknowledged { .. }).then_some(())
     })
     .await;
     assert_eq!(
-        daemon.acknowledge(&by).await.unwrap_err().kind,
+        daemon.acknowledge(&by, &fault.id).await.unwrap_err().kind,
         RefusalKind::Conflict
     );
     let still = daemon.job(job.id).await.unwrap();
@@ -118,7 +124,7 @@ async fn an_emergency_stop_of_an_idle_rig_is_latched_too() {
     state(&mut events, job.id, JobState::AwaitingSpecimen).await;
     let refusal = daemon.act(&by, job.id, Action::Ready).await.unwrap_err();
     assert_eq!(refusal.kind, RefusalKind::Conflict, "{refusal}");
-    daemon.acknowledge(&by).await.unwrap();
+    acknowledge(&daemon).await;
     daemon.act(&by, job.id, Action::Ready).await.unwrap();
     state(&mut events, job.id, JobState::Done).await;
     daemon.shutdown().await;
@@ -191,5 +197,82 @@ async fn after_a_restart_nothing_starts_by_itself() {
     daemon.act(&by, second.id, Action::Ready).await.unwrap();
     state(&mut events, second.id, JobState::Done).await;
     state(&mut events, third.id, JobState::AwaitingSpecimen).await;
+    daemon.shutdown().await;
+}
+
+#[tokio::test]
+async fn an_acknowledgement_ends_the_fault_that_it_names_and_no_newer_one() {
+    let bench = Bench::new("");
+    let daemon = bench.open().await;
+    let by = operator();
+    rig(&daemon, |rig| rig.connected).await;
+    let first = daemon.estop(&by).await.unwrap();
+    let second = daemon.estop(&by).await.unwrap();
+    assert_ne!(first, second, "each press is a fault of its own");
+    let refusal = daemon.acknowledge(&by, &first).await.unwrap_err();
+    assert_eq!(refusal.kind, RefusalKind::Conflict);
+    assert_eq!(
+        refusal.newer.map(|fault| fault.id),
+        Some(second.clone()),
+        "the newer one is told"
+    );
+    assert!(daemon.rig().borrow().fault.is_some(), "it is latched still");
+    daemon.acknowledge(&by, &second).await.unwrap();
+    assert!(daemon.rig().borrow().fault.is_none());
+    daemon.shutdown().await;
+}
+
+#[tokio::test]
+async fn acknowledging_a_stalled_jog_starts_no_job_that_waits() {
+    let bench =
+        Bench::new("[sim]\nfault = [{ device = \"light\", at_s = 0.0, what = { stall_s = 600.0 } }]\n");
+    let daemon = bench.open().await;
+    let by = operator();
+    daemon
+        .jog(&by, Arm::Light, ArmAngle::from_deg(-10.0))
+        .await
+        .unwrap();
+    let job = daemon.submit(&by, submission(&on_stage())).await.unwrap();
+    rig(&daemon, |rig| {
+        rig.fault.is_some() && rig.activity == Activity::Idle
+    })
+    .await;
+    while let Err(refusal) = {
+        let fault = daemon.rig().borrow().fault.clone().expect("it is latched");
+        daemon.acknowledge(&by, &fault.id).await
+    } {
+        assert_eq!(refusal.kind, RefusalKind::Conflict, "{refusal}");
+        tokio::task::yield_now().await;
+    }
+    // Whatever the queue does, it has done once it answers.
+    let other = daemon.submit(&by, submission(SHORT)).await.unwrap();
+    daemon.act(&by, other.id, Action::Cancel).await.unwrap();
+    assert_eq!(
+        daemon.job(job.id).await.unwrap().state,
+        JobState::AwaitingSpecimen
+    );
+    daemon.shutdown().await;
+}
+
+#[tokio::test]
+async fn a_stop_holds_the_queue_after_a_restart_too() {
+    let bench = Bench::new("");
+    let daemon = bench.open().await;
+    daemon.stop(&operator()).await.unwrap();
+    daemon.shutdown().await;
+    let daemon = bench.open().await;
+    let job = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    let mut events = daemon.events(Some(0));
+    state(&mut events, job.id, JobState::AwaitingSpecimen).await;
+    // Moving an arm by hand moves that arm, and ends no hold.
+    daemon
+        .jog(&operator(), Arm::Light, ArmAngle::from_deg(-10.0))
+        .await
+        .unwrap();
+    rig(&daemon, |rig| {
+        rig.activity == Activity::Idle && !rig.arms[0].moving
+    })
+    .await;
+    assert!(daemon.rig().borrow().queue_held.is_some());
     daemon.shutdown().await;
 }

@@ -56,13 +56,12 @@ async fn what_was_kept_is_there_after_it_is_opened_again() {
     assert_eq!(store.begin_life("then").await.unwrap(), 1);
     let run = with_run(&store).await;
     store.append(&run.id, 1, &end("first")).await.unwrap();
-    let fault = FaultView {
-        code: FaultCode::NoReply,
-        text: "silent".to_owned(),
-        at: "then".to_owned(),
-        run: Some(run.id.clone()),
-    };
-    store.latch(&fault).await.unwrap();
+    // As a version did that had no file for faults.
+    sqlx::query("INSERT INTO faults (seq, code, what, at, run) VALUES (1, 'no_reply', 'silent', 'then', $1)")
+        .bind(&run.id)
+        .execute(&store.writer)
+        .await
+        .unwrap();
     store.audit("then", "me", "estop", "done").await.unwrap();
     store.close().await;
     let store = Sqlite::open(&path).await.unwrap();
@@ -72,9 +71,9 @@ async fn what_was_kept_is_there_after_it_is_opened_again() {
         [end("the header"), end("first")]
     );
     assert_eq!(store.runs(9).await.unwrap(), std::slice::from_ref(&run));
-    assert_eq!(store.latched().await.unwrap(), Some(fault));
-    store.acknowledge("me", "now").await.unwrap();
-    assert_eq!(store.latched().await.unwrap(), None);
+    let fault = store.latched().await.unwrap().expect("it is latched");
+    assert_eq!((fault.code, fault.text.as_str()), (FaultCode::NoReply, "silent"));
+    assert_eq!(fault.run, Some(run.id.clone()));
     store.reported(&run.id, "now").await.unwrap();
     let reported = store.run(&run.id).await.unwrap().unwrap().reported;
     assert_eq!(reported.as_deref(), Some("now"));

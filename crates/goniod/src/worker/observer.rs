@@ -2,9 +2,8 @@ use std::sync::Arc;
 
 use capture::{Event, Reading, Record, State};
 use sweep::Sweep;
-use tokio::sync::mpsc;
 
-use crate::queue::News;
+use crate::operator::Permit;
 use crate::shared::Shared;
 use crate::{Activity, FaultCode, Progress, What, view};
 
@@ -12,9 +11,9 @@ use crate::{Activity, FaultCode, Progress, What, view};
 const DIFFERENCE: f64 = 0.01;
 
 /// Turns what a capture says into what the daemon shows and tells.
-pub(super) struct Observer {
+pub(super) struct Observer<'a> {
     shared: Arc<Shared>,
-    news: mpsc::UnboundedSender<News>,
+    permit: &'a Permit,
     run: String,
     /// What the reflectance of a reading rests on: header, first beginning, readings in the dark and of a reference, and
     /// the one that ends each series in the dark, or two series would count as one.
@@ -25,16 +24,11 @@ pub(super) struct Observer {
     pub(super) fault: Option<FaultCode>,
 }
 
-impl Observer {
-    pub(super) fn new(
-        shared: Arc<Shared>,
-        news: mpsc::UnboundedSender<News>,
-        run: &str,
-        records: &[Record],
-    ) -> Self {
+impl<'a> Observer<'a> {
+    pub(super) fn new(shared: Arc<Shared>, permit: &'a Permit, run: &str, records: &[Record]) -> Self {
         let mut observer = Self {
             shared,
-            news,
+            permit,
             run: run.to_owned(),
             basis: Vec::new(),
             beside: Vec::new(),
@@ -56,7 +50,7 @@ impl Observer {
                 sweep,
                 goal,
             } => {
-                self.shared.tell(What::Step {
+                self.shared.publish(What::Step {
                     step,
                     of,
                     sweep: sweep.to_string(),
@@ -69,7 +63,7 @@ impl Observer {
                 reading,
                 difference_rel,
             } => {
-                self.shared.tell(What::Repeat {
+                self.shared.publish(What::Repeat {
                     step: reading.step,
                     difference_rel,
                 });
@@ -96,27 +90,24 @@ impl Observer {
                 self.shared
                     .view
                     .send_modify(|view| view.progress = Some(progress));
-                self.shared.tell(What::Progress { progress });
+                self.shared.publish(What::Progress { progress });
             }
             Event::Suspended { why } => self.shared.warn(format!("the run holds: {why}")),
+            Event::Safe => self.permit.release(),
             Event::Fault { kind, .. } => self.fault = Some(view::fault_code(kind)),
         }
     }
 
     fn state(&mut self, state: State) {
-        let before = self.shared.view.borrow().activity;
         let activity = view::activity(state);
         self.shared.activity(activity);
+        self.shared.holding.send_if_modified(|holding| {
+            let now = activity == Activity::Paused;
+            std::mem::replace(holding, now) != now
+        });
         if activity == Activity::WarmingUp {
             self.shared.view.send_modify(|view| view.lamp = true);
         }
-        let holding = match (before, activity) {
-            (Activity::Paused, Activity::Paused) => return,
-            (_, Activity::Paused) => true,
-            (Activity::Paused, Activity::Running) => false,
-            _ => return,
-        };
-        let _ = self.news.send(News::Holding(holding));
     }
 
     fn reading(&mut self, reading: &Reading) {
@@ -151,7 +142,7 @@ impl Observer {
             }
         });
         if let Some(measured) = measured {
-            self.shared.tell(What::Reading {
+            self.shared.publish(What::Reading {
                 run: self.run.clone(),
                 reading: Box::new(view::reading(&measured)),
             });

@@ -8,24 +8,23 @@ use session::Status;
 use crate::error::CommandError;
 use crate::{exit, print};
 
-/// What an operator's hand does with the rig, whatever job is under way.
+/// What an operator has the rig do, whatever job is under way.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Hand {
+pub(crate) enum OperatorCommand {
     Pause,
     Stop,
     Estop,
-    Acknowledge,
     Jog(Arm, ArmAngle),
     Park,
 }
 
-impl Hand {
+impl OperatorCommand {
     /// Has the daemon do it, and says so; for machines, how the rig stands then. A motion is waited for; exit code 3
     /// where it ended in a fault.
     ///
     /// # Errors
     /// The daemon does not answer, or refuses.
-    pub(crate) fn lay_on(self, daemon: &Client, as_json: bool) -> anyhow::Result<ExitCode> {
+    pub(crate) fn send(self, daemon: &Client, as_json: bool) -> anyhow::Result<ExitCode> {
         let said = match self {
             Self::Pause => {
                 daemon.act("/pause")?;
@@ -33,15 +32,11 @@ impl Hand {
             }
             Self::Stop => {
                 daemon.act("/stop")?;
-                "stopping; `gonioctl resume` goes on"
+                "stopping; nothing starts by itself until `gonioctl resume`, `ready` or `run`"
             }
             Self::Estop => {
                 daemon.act("/estop")?;
                 "EMERGENCY STOP; nothing moves until `gonioctl acknowledge`"
-            }
-            Self::Acknowledge => {
-                daemon.act("/acknowledge")?;
-                "acknowledged"
             }
             Self::Jog(..) | Self::Park => return self.drive(daemon, as_json),
         };
