@@ -267,8 +267,9 @@ async def stop(daemon, told):
             acknowledged.append((time.monotonic() - begun) * 1e3)
             assert await asyncio.to_thread(told.poll, 5), "no stop on the wire"
             stopped.append((told.recv() - begun) * 1e3)
-            for path in ["/api/v1/acknowledge", f"/api/v1/jobs/{job}/resume"]:
-                while (answer := await daemon.ask("POST", path))[0] not in (200, 204):
+            fault = (await daemon.read("/api/v1/rig"))["fault"]["id"]
+            for path, body in [("/api/v1/acknowledge", json.dumps({"fault": fault})), (f"/api/v1/jobs/{job}/resume", "")]:
+                while (answer := await daemon.ask("POST", path, body, "application/json"))[0] not in (200, 204):
                     # The arms come to rest first, and what was measured is reported.
                     assert answer[0] == 409, answer
                     await asyncio.sleep(0.1)

@@ -323,18 +323,32 @@ fn run_lays_the_specimen_on_the_stage_of_a_daemon_that_has_the_rig_and_of_no_oth
 #[test]
 fn an_emergency_stop_is_latched_until_it_is_acknowledged() {
     let service = Service::start(&["--listen", "127.0.0.1:0"]);
-    let id = service.submit("long.toml");
-    let mut watcher = Watcher::of(&service, &id);
+    let job = service.submit("long.toml");
+    let mut watcher = Watcher::of(&service, &job);
     watcher.readings(20);
     let _ = service.gonioctl(&["estop"]).expect(0);
     watcher.state("interrupted");
     assert_eq!(watcher.code(), 3, "ended by a fault");
     let refused = service.gonioctl(&["park"]).expect(5);
     assert!(refused.stderr.contains("acknowledge"), "{}", refused.stderr);
-    let rig = service.rig(&["acknowledge"]);
+    // Nobody can be asked here whether the rig was looked at.
+    let unnamed = service.gonioctl(&["acknowledge"]).expect(2);
+    let id = unnamed.stderr.split("--fault ").nth(1).unwrap().trim().to_owned();
+    assert!(unnamed.stderr.contains("emergency stop by"), "{}", unnamed.stderr);
+    let _ = service.gonioctl(&["estop"]).expect(0);
+    let older = service.gonioctl(&["acknowledge", "--fault", &id]).expect(5);
+    let id = older
+        .stderr
+        .split("fault ")
+        .nth(2)
+        .unwrap()
+        .split(' ')
+        .next()
+        .unwrap();
+    let rig = service.rig(&["acknowledge", "--fault", id]);
     assert!(rig["fault"].is_null(), "{rig:#}");
-    let _ = service.gonioctl(&["acknowledge"]).expect(5);
-    let _ = service.gonioctl(&["cancel", &id]).expect(0);
+    let _ = service.gonioctl(&["acknowledge", "--fault", id]).expect(5);
+    let _ = service.gonioctl(&["cancel", &job]).expect(0);
 }
 
 #[test]

@@ -81,7 +81,15 @@ async fn obey(daemon: &Daemon, command: &str) -> Result<Value, Refusal> {
         "proceed" => Ok(json!(daemon.proceed(&by).await?)),
         "stop" => Ok(json!(daemon.stop(&by).await?)),
         "estop" => Ok(json!(daemon.estop(&by).await?)),
-        "acknowledge" => Ok(json!(daemon.acknowledge(&by).await?)),
+        "acknowledge" => {
+            let fault = daemon
+                .rig()
+                .borrow()
+                .fault
+                .clone()
+                .expect("the test waited for it");
+            Ok(json!(daemon.acknowledge(&by, &fault.id).await?))
+        }
         "park" => Ok(json!(daemon.park(&by).await?)),
         other => panic!("no such command: {other}"),
     }

@@ -141,14 +141,42 @@ async fn an_emergency_stop_holds_until_it_is_acknowledged() {
     let mut watch = service.watch("").await;
     assert_eq!(service.post("/api/v1/estop").await.status, 204);
     watch.until(|event| event["event"] == "fault").await;
-    assert_eq!(service.get("/api/v1/rig").await.json()["fault"]["code"], "estop");
+    let latched = service.get("/api/v1/rig").await.json()["fault"].clone();
+    assert_eq!(latched["code"], "estop");
     let json = "Content-Type: application/json\r\n";
     let jog = |deg: f64| format!("{{\"arm\":\"light\",\"angle_deg\":{deg}}}");
     service
         .ask("POST", "/api/v1/jog", json, &jog(-40.0))
         .await
         .problem(409);
-    assert_eq!(service.post("/api/v1/acknowledge").await.status, 204);
+    // Somebody presses again before the one who looked acknowledges what was looked at.
+    assert_eq!(service.post("/api/v1/estop").await.status, 204);
+    let acknowledge = |id: &str| format!("{{\"fault\":\"{id}\"}}");
+    let old = acknowledge(latched["id"].as_str().unwrap());
+    let refused = service.ask("POST", "/api/v1/acknowledge", json, &old).await;
+    refused.problem(409);
+    let newer = refused.json()["fault"]["id"].as_str().unwrap().to_owned();
+    assert_eq!(
+        service.get("/api/v1/rig").await.json()["fault"]["id"],
+        newer.as_str()
+    );
+    for (body, status) in [
+        ("", 422),
+        ("{}", 422),
+        ("{\"fault\":1}", 422),
+        ("{\"fault\":\"\"}", 409),
+    ] {
+        let refused = service.ask("POST", "/api/v1/acknowledge", json, body).await;
+        assert_eq!(refused.status, status, "{body:?}");
+    }
+    let new = acknowledge(&newer);
+    assert_eq!(
+        service
+            .ask("POST", "/api/v1/acknowledge", json, &new)
+            .await
+            .status,
+        204
+    );
     assert_eq!(
         service.ask("POST", "/api/v1/jog", json, &jog(-40.0)).await.status,
         204
