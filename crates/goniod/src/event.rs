@@ -43,7 +43,7 @@ impl Log {
             kept.pop_front();
         }
         kept.push_back(Event { id, at, what });
-        drop(kept);
+        // Before another one is let in: two events must not have one id, or whoever reads misses the second.
         self.last.send_modify(|last| last.id = id);
     }
 
@@ -109,6 +109,19 @@ mod tests {
 
     fn warning(n: usize) -> What {
         What::Warning { text: n.to_string() }
+    }
+
+    #[test]
+    fn events_of_many_threads_have_ids_of_their_own() {
+        const EACH: u64 = 2000;
+        let log = Log::new(0);
+        std::thread::scope(|threads| {
+            for _ in 0..4 {
+                threads.spawn(|| (0..EACH / 4).for_each(|n| log.publish(String::new(), warning(n as usize))));
+            }
+        });
+        let ids: Vec<u64> = log.kept.lock().unwrap().iter().map(|event| event.id).collect();
+        assert_eq!(ids, (1..=EACH).collect::<Vec<_>>());
     }
 
     #[tokio::test]
