@@ -36,14 +36,15 @@ use clap::Parser;
 use cli::{ArmName, Cli, Command, DaemonArguments, Output};
 use operator::OperatorCommand;
 use run::Task;
-use tracing_subscriber::EnvFilter;
+use tracing::level_filters::LevelFilter;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 /// Runs the command line of this process and returns its exit code.
 pub fn main() -> ExitCode {
-    tracing_subscriber::fmt()
-        .with_env_filter(EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn")))
-        .with_writer(std::io::stderr)
-        .init();
+    let log = tracing_subscriber::fmt::layer().with_writer(std::io::stderr);
+    let filter = session::log_filter(LevelFilter::WARN);
+    tracing_subscriber::registry().with(log).with(filter).init();
     match command(Cli::parse().command) {
         Ok(code) => code,
         Err(error) => {

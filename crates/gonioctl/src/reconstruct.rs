@@ -51,15 +51,11 @@ enum Stored {
 /// Has the daemon's program make the run directory from the store that lies beside `runs`: only that program reads it.
 /// `None`: there is no store, or it does not know the run.
 fn from_store(run: &Path) -> Option<anyhow::Result<Stored>> {
+    let run = std::path::absolute(run).ok()?;
     let store = run.parent()?.parent()?.join("goniod.db");
-    let store = if store.is_absolute() || store.parent()? != Path::new("") {
-        store
-    } else {
-        Path::new(".").join(store)
-    };
     store
         .exists()
-        .then(|| ask_goniod(run))
+        .then(|| ask_goniod(&run))
         .and_then(Result::transpose)
 }
 
