@@ -58,4 +58,12 @@ pub enum SimError {
         /// Why it failed.
         source: std::io::Error,
     },
+    /// The file cannot be written to which what the host writes is appended.
+    #[error("cannot append what the host writes to {}", .path.display())]
+    Trace {
+        /// The file.
+        path: std::path::PathBuf,
+        /// Why it failed.
+        source: std::io::Error,
+    },
 }

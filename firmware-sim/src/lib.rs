@@ -33,4 +33,4 @@ pub use mishaps::Mishap;
 pub use orders::Order;
 pub use program::main;
 pub use settings::{Clock, Settings};
-pub use wire::{Counters, Line, Outgoing, Server, WireFaults, WireSettings};
+pub use wire::{Counters, Line, Outgoing, Server, WireFaults, WireSettings, Written};

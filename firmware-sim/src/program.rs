@@ -13,6 +13,8 @@ use tracing_subscriber::util::SubscriberInitExt;
 
 use crate::{Bench, Clock, Order, Server, WireSettings};
 
+mod trace;
+
 /// A simulated Dynamixel bus on a pseudo-terminal: two servo arms (ids 1 and 2), a photometer (id 3), a lamp and a
 /// specimen. Prints the path to open; runs until it is interrupted.
 #[derive(Parser)]
@@ -35,6 +37,10 @@ struct Arguments {
     /// "fault = { device = 'sensor', what = 'overload' }", "plugged = false". docs/simulator.md has them all.
     #[arg(long)]
     orders: bool,
+    /// Append to a file, a line of JSON each, all that the host writes to the devices: when it came, by the
+    /// system's clock and in the rig's time, to which id, from which address on, which bytes.
+    #[arg(long, value_name = "FILE")]
+    trace: Option<PathBuf>,
 }
 
 /// Runs `firmware-sim` with the arguments of this process: serves until SIGINT or SIGTERM, then returns 0; 2 for bad
@@ -89,6 +95,9 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
         let mut server = Server::with_bench(bench, &settings)?;
         if let Some(link) = &arguments.link {
             server.link(link)?;
+        }
+        if let Some(path) = &arguments.trace {
+            trace::keep(path, &server)?;
         }
         writeln!(std::io::stdout(), "{}", server.path().display())?;
         tracing::info!(wire_time = arguments.wire_time, "serving");

@@ -1,5 +1,4 @@
-use super::instruction::{Instruction, Write};
-use super::packet::Packet;
+use super::instruction::Write;
 
 /// Goal Position of the X series, 4 bytes.
 const GOAL_POSITION: std::ops::Range<u16> = 116..120;
@@ -28,23 +27,15 @@ pub struct Counters {
 }
 
 impl Counters {
-    /// Counts a good packet from the host.
-    pub(super) fn note(&mut self, packet: &Packet, unheard: bool) {
+    /// Counts a good packet from the host, with the writes in it.
+    pub(super) fn note(&mut self, writes: &[Write<'_>], unheard: bool) {
         self.packets += 1;
         self.unheard += u64::from(unheard);
-        let sets_goal = |write: &Write<'_>| {
+        let sets_goal = |write: &&Write<'_>| {
             let end = usize::from(write.address) + write.bytes.len();
             usize::from(write.address) < usize::from(GOAL_POSITION.end)
                 && end > usize::from(GOAL_POSITION.start)
         };
-        self.goals += match Instruction::decode(packet) {
-            Some(Ok(Instruction::Write(write) | Instruction::RegWrite(write))) => {
-                u64::from(sets_goal(&write))
-            }
-            Some(Ok(Instruction::Writes(writes))) => {
-                writes.iter().filter(|write| sets_goal(write)).count() as u64
-            }
-            _ => 0,
-        };
+        self.goals += writes.iter().filter(sets_goal).count() as u64;
     }
 }

@@ -67,6 +67,15 @@ impl<'a> Instruction<'a> {
     }
 }
 
+/// What a packet writes, by any kind of write.
+pub(super) fn writes(packet: &Packet) -> Vec<Write<'_>> {
+    match Instruction::decode(packet) {
+        Some(Ok(Instruction::Write(write) | Instruction::RegWrite(write))) => vec![write],
+        Some(Ok(Instruction::Writes(writes))) => writes,
+        _ => Vec::new(),
+    }
+}
+
 fn empty<'a>(params: &[u8], instruction: Instruction<'a>) -> Result<Instruction<'a>, Refusal> {
     if params.is_empty() {
         Ok(instruction)

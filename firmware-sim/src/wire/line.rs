@@ -1,4 +1,5 @@
 use std::collections::VecDeque;
+use std::sync::mpsc::Sender;
 use std::time::Duration;
 
 use rand::{RngExt, SeedableRng};
@@ -6,8 +7,10 @@ use rand_chacha::ChaCha8Rng;
 
 use super::answer::Slot;
 use super::dispatch::Dispatcher;
+use super::instruction::writes;
 use super::packet::Packet;
 use super::parser::Parser;
+use super::written::Written;
 use super::{Counters, WireFaults, WireSettings};
 use crate::{Bench, Clock, Device};
 
@@ -38,6 +41,8 @@ pub struct Line {
     parser: Parser,
     dispatcher: Dispatcher,
     counters: Counters,
+    /// Who is told what the host writes.
+    trace: Option<Sender<Written>>,
     /// Bench time until which the line is taken.
     free: Duration,
 }
@@ -56,6 +61,7 @@ impl Line {
             parser: Parser::default(),
             dispatcher: Dispatcher::default(),
             counters: Counters::default(),
+            trace: None,
         }
     }
 
@@ -91,6 +97,11 @@ impl Line {
             damaged: self.parser.damaged(),
             ..self.counters
         }
+    }
+
+    /// Has all that the host writes from now on told to one listener, in the place of an earlier one.
+    pub fn trace(&mut self, listener: Sender<Written>) {
+        self.trace = Some(listener);
     }
 
     /// Takes bytes that the host sent at `baud`, and gives what it will hear.
@@ -143,7 +154,14 @@ impl Line {
                 heard.push(device);
             }
         }
-        self.counters.note(packet, heard.is_empty());
+        let writes = writes(packet);
+        self.counters.note(&writes, heard.is_empty());
+        if let Some(listener) = &self.trace {
+            for write in &writes {
+                // A listener that is gone needs to hear nothing more.
+                let _ = listener.send(Written::new(write, now, host));
+            }
+        }
         let slots = self.dispatcher.dispatch(packet, &mut heard);
         let lost = self.bench.take_lost_acknowledgement();
         self.free = self.free.max(now) + self.bench.take_delay().unwrap_or_default();

@@ -19,9 +19,11 @@ mod server;
 mod settings;
 mod stuffing;
 mod terminal;
+mod written;
 
 pub use counters::Counters;
 pub use faults::WireFaults;
 pub use line::{Line, Outgoing};
 pub use server::Server;
 pub use settings::WireSettings;
+pub use written::Written;

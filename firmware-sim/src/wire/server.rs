@@ -1,6 +1,7 @@
 use std::collections::VecDeque;
 use std::io::{self, PipeReader, PipeWriter};
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -12,7 +13,7 @@ use rustix::io::Errno;
 use super::line::{Line, Outgoing};
 use super::link::Link;
 use super::terminal::Terminal;
-use super::{Counters, WireFaults, WireSettings};
+use super::{Counters, WireFaults, WireSettings, Written};
 use crate::{Bench, SimError};
 
 /// Longest time until the mark of a killed client is cleared.
@@ -156,6 +157,18 @@ impl Server {
     /// Has what goes wrong on the wire change at a time of the bench.
     pub fn schedule(&self, at: Duration, faults: WireFaults) {
         self.shared.line().schedule(at, faults);
+    }
+
+    /// All that the host writes from now on, as it arrives; an earlier trace ends. What is not taken out is kept.
+    pub fn trace(&self) -> Receiver<Written> {
+        let (listener, trace) = channel();
+        self.shared.line().trace(listener);
+        trace
+    }
+
+    /// When the line was opened, from which [`Written::received`] counts.
+    pub fn opened(&self) -> Instant {
+        self.shared.opened
     }
 
     /// What passed over the wire so far.

@@ -142,6 +142,40 @@ fn faults_and_the_bench_are_within_reach_while_it_serves() {
 }
 
 #[test]
+fn a_trace_tells_every_kind_of_write_in_the_order_of_the_wire() {
+    let server = server(Clock::Wire);
+    let mut client = Client::open(server.path(), 1_000_000).unwrap();
+    client.send(3, 0x03, &[64, 0, 1]);
+    assert!(client.hear(PATIENCE).is_some(), "written before anybody traces");
+    let trace = server.trace();
+    let before = server.opened().elapsed();
+    // Write, Reg Write, Sync Write; what is read is no write.
+    client.send(1, 0x03, &[64, 0, 1]);
+    client.send(2, 0x04, &[116, 0, 0, 8, 0, 0]);
+    client.send(1, 0x02, &[132, 0, 4, 0]);
+    client.send(0xFE, 0x83, &[65, 0, 1, 0, 1, 1, 2, 0]);
+    assert_eq!(client.ping(1), Some(Packet::status(1, 0, &[])));
+    for _ in 0..3 {
+        assert!(client.hear(PATIENCE).is_some());
+    }
+    let told: Vec<_> = trace.try_iter().collect();
+    let content: Vec<_> = told.iter().map(|w| (w.id, w.address, &w.bytes[..])).collect();
+    let expected: [(u8, u16, &[u8]); 4] = [
+        (1, 64, &[1]),
+        (2, 116, &[0, 8, 0, 0]),
+        (1, 65, &[1]),
+        (2, 65, &[0]),
+    ];
+    assert_eq!(content, expected);
+    assert!(told.is_sorted_by_key(|written| (written.at, written.received)));
+    let now = server.opened().elapsed();
+    assert!(
+        told.iter()
+            .all(|written| (before..=now).contains(&written.received))
+    );
+}
+
+#[test]
 fn dropping_the_server_hangs_up() {
     let server = server(Clock::Real);
     let mut client = Client::open(server.path(), 1_000_000).unwrap();
