@@ -5,6 +5,9 @@
   .ci/service/measure.py target/release/goniod idle    memory, processor time, time to the first answer
   .ci/service/measure.py target/release/goniod load    readings a second while 50 watch and 200 requests a second come
   .ci/service/measure.py target/release/goniod stop    emergency stops under that load: acknowledged, and on the wire
+  .ci/service/measure.py target/release/goniod flood   emergency stops, over TCP, the Unix socket and by gonioctl, while
+                                                       others open sockets and do not read, or send stops without end;
+                                                       needs gonioctl beside goniod
   .ci/service/measure.py target/release/goniod night   memory over a thousand runs in simulated time
 
 Each ends with an error where what docs/http.md promises does not hold. On a machine that is busy otherwise, times say
@@ -21,6 +24,7 @@ import random
 import select
 import shutil
 import signal
+import socket
 import statistics
 import subprocess
 import sys
@@ -36,6 +40,11 @@ CALM_S = 20
 PRESSES = 40
 IDLE_S = 30
 RUNS = 1000
+# Sockets that ask for the page and never read, of each kind of listener.
+UNREAD = 520
+# Connections that send stops without end.
+STOPPERS = 8
+FLOOD_PRESSES = 100
 # Runs that are queued at once.
 BATCH = 20
 # Runs after which memory should have found its level.
@@ -65,13 +74,13 @@ readings = 8
 class Daemon:
     """A daemon on a free port, with a rig."""
 
-    def __init__(self, program, folder, rig):
-        self.data = Path(folder, "data")
+    def __init__(self, program, folder, rig, *more):
+        self.program, self.data = Path(program), Path(folder, "data")
         file = Path(folder, "rig.toml")
         file.write_text(rig)
         begun = time.monotonic()
         self.process = subprocess.Popen(
-            [program, "--config", file, "--data", self.data, "--listen", "127.0.0.1:0"],
+            [program, "--config", file, "--data", self.data, "--listen", "127.0.0.1:0", *more],
             stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=os.environ | {"RUST_LOG": "warn"}, text=True)
         address = self.process.stdout.readline().strip()
         self.host, port = address.removeprefix("http://").split(":")
@@ -282,6 +291,139 @@ async def stop(daemon, told):
     ])
 
 
+class Flood:
+    """Emergency stops past those who flood the daemon: sent, and seen by the simulated servos."""
+
+    def __init__(self, daemon, folder, trace):
+        self.daemon, self.trace, self.socket = daemon, trace, Path(folder, "goniod.sock")
+        self.tokens = Path(folder, "tokens.toml")
+        self.token = next(line.split('"')[1] for line in self.tokens.read_text().splitlines() if line.startswith("operate"))
+        self.token_file = Path(folder, "token")
+        self.token_file.write_text(self.token)
+        self.token_file.chmod(0o600)
+
+    def connect(self, unix):
+        if unix:
+            connection = socket.socket(socket.AF_UNIX)
+            connection.connect(str(self.socket))
+        else:
+            connection = socket.create_connection((self.daemon.host, self.daemon.port))
+        return connection
+
+    def request(self, method, path):
+        return (f"{method} {path} HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {self.token}\r\n"
+                "Content-Length: 0\r\n\r\n").encode()
+
+    def unread(self):
+        """Sockets that ask for the page again and again and never read; replaced as the daemon closes them."""
+        page = b"GET / HTTP/1.1\r\nHost: localhost\r\n\r\n"
+        kept = {unix: [] for unix in (False, True)}
+        while True:
+            for unix, sockets in kept.items():
+                with contextlib.suppress(OSError):
+                    connection = self.connect(unix)
+                    connection.setblocking(False)
+                    connection.send(page * 20)
+                    sockets.append(connection)
+                if len(sockets) > UNREAD:
+                    sockets.pop(0).close()
+            if len(kept[True]) >= UNREAD:
+                time.sleep(0.01)
+
+    def stoppers(self):
+        """Sends stops as fast as they are taken, and reads the answers without looking at them."""
+        many = self.request("POST", "/api/v1/stop") * 200
+        sockets = [self.connect(unix=i % 2 == 1) for i in range(STOPPERS)]
+        for connection in sockets:
+            connection.setblocking(False)
+        rest = dict.fromkeys(sockets, b"")
+        while True:
+            readable, writable, _ = select.select(sockets, sockets, [])
+            for connection in readable:
+                with contextlib.suppress(BlockingIOError):
+                    connection.recv(1 << 20)
+            for connection in writable:
+                # The rest of a request that was cut short comes first the next time.
+                with contextlib.suppress(BlockingIOError):
+                    rest[connection] = (rest[connection] or many)[connection.send(rest[connection] or many):]
+
+    def press(self, way):
+        """Presses once; returns how long it took until both servos had it, ms."""
+        # An earlier stop may be told more than once.
+        while self.trace.lines(0):
+            pass
+        begun = time.time()
+        if way == "gonioctl":
+            subprocess.run([self.daemon.program.with_name("gonioctl"), "estop", "--daemon", f"unix:{self.socket}",
+                            "--token-file", self.token_file], check=True, stdout=subprocess.DEVNULL)
+        else:
+            with self.connect(unix=way == "unix") as connection:
+                connection.sendall(self.request("POST", "/api/v1/estop"))
+                answer = connection.recv(4096)
+                assert answer.startswith(b"HTTP/1.1 204"), answer
+        return (self.stopped(begun) - begun) * 1e3
+
+    def stopped(self, begun):
+        """When both servos had their profile off, and then a goal."""
+        stopping, stopped = set(), set()
+        while time.time() < begun + 5:
+            for line in self.trace.lines(0.2):
+                if line["address"] == 108 and not any(line["bytes"]):
+                    stopping.add(line["id"])
+                elif line["address"] == 116 and line["id"] in stopping:
+                    stopped.add(line["id"])
+                if len(stopped) == 2:
+                    return line["unix_s"]
+        raise AssertionError("no stop on the wire")
+
+    def measure(self):
+        good = []
+        for flooded in (self.unread, self.stoppers):
+            nuisance = multiprocessing.Process(target=flooded, daemon=True)
+            nuisance.start()
+            time.sleep(3)
+            for way in ("tcp", "unix", "gonioctl"):
+                times = []
+                for _ in range(FLOOD_PRESSES):
+                    times.append(self.press(way))
+                    time.sleep(0.02)
+                print(f"{flooded.__name__}, {way}: median {statistics.median(times):.1f} ms of {FLOOD_PRESSES} presses; "
+                      f"load average {os.getloadavg()[0]:.1f}")
+                good.append(check("both servos have it, at most", max(times), "ms", 100))
+            nuisance.terminate()
+            nuisance.join()
+        return all(good)
+
+
+class Trace:
+    """What the simulated bus tells that the host wrote."""
+
+    def __init__(self, path):
+        os.mkfifo(path)
+        self.file, self.kept = os.open(path, os.O_RDONLY | os.O_NONBLOCK), b""
+
+    def lines(self, wait_s):
+        """What has come, after waiting for so long at most."""
+        if not select.select([self.file], [], [], wait_s)[0]:
+            return []
+        *lines, self.kept = (self.kept + os.read(self.file, 1 << 16)).split(b"\n")
+        return [json.loads(line) for line in lines]
+
+
+@contextlib.contextmanager
+def traced_bus(program, folder):
+    """A simulated bus in real time: its port, and what it tells."""
+    path = Path(folder, "trace")
+    trace = Trace(path)
+    bus = subprocess.Popen([Path(program).with_name("firmware-sim"), "--trace", path], stdout=subprocess.PIPE,
+                           stderr=subprocess.DEVNULL, text=True)
+    try:
+        yield bus.stdout.readline().strip(), trace
+    finally:
+        bus.terminate()
+        bus.wait()
+
+
 async def night(daemon):
     """Short runs one after the other; their directories are removed, or they would fill the disk. Memory is read where
     nothing runs: which moment of a report is met makes 40 MB."""
@@ -319,17 +461,23 @@ def tapped_bus(program):
 
 
 def measure(program, what, folder, stack):
-    if what == "stop":
+    more = []
+    if what == "flood":
+        port, trace = stack.enter_context(traced_bus(program, folder))
+        rig = f'[bus]\nport = "{port}"\n'
+        more = ["--listen", f"unix:{folder}/goniod.sock", "--tokens", f"{folder}/tokens.toml"]
+    elif what == "stop":
         port, told = stack.enter_context(tapped_bus(program))
         rig = f'[bus]\nport = "{port}"\n'
     else:
         rig = f'[sim]\nclock = "{"wire" if what == "night" else "real"}"\n'
-    daemon = Daemon(program, folder, rig)
+    daemon = Daemon(program, folder, rig, *more)
     try:
         good = {
             "idle": lambda: idle(daemon),
             "load": lambda: asyncio.run(load(daemon)),
             "stop": lambda: asyncio.run(stop(daemon, told)),
+            "flood": lambda: Flood(daemon, folder, trace).measure(),
             "night": lambda: asyncio.run(night(daemon)),
         }[what]()
     finally:

@@ -1,8 +1,10 @@
 //! The HTTP interface: API, page, metrics. It carries out nothing itself; every request becomes a call of the
 //! [`Daemon`](crate::Daemon) handle.
 
+mod accept;
 mod access;
 mod body;
+mod connections;
 mod events;
 mod job_file;
 mod jobs;
@@ -19,6 +21,7 @@ mod session;
 mod shared;
 mod site;
 mod tokens;
+mod watched;
 
 pub use access::Access;
 pub use listener::{Address, Listener};

@@ -6,6 +6,7 @@ use std::time::SystemTime;
 
 use anyhow::Context;
 use clap::{CommandFactory, Parser, ValueEnum};
+use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use sd_notify::NotifyState;
 use session::{SessionError, Status};
 use tokio::signal::unix::{SignalKind, signal};
@@ -113,6 +114,7 @@ async fn reconstruct(directory: &Path) -> anyhow::Result<()> {
 }
 
 async fn run(arguments: Arguments) -> anyhow::Result<()> {
+    open_files();
     // Asked for first: a signal during start-up ends it just as well.
     let ended = terminated()?;
     let (rig, rig_name) = session::rig_text(arguments.config.as_deref())?;
@@ -175,6 +177,19 @@ async fn serve(
         }
     }
     Ok(())
+}
+
+/// Lets this process have as many files open as the system allows it: the store, the runs and the files that are
+/// downloaded must not run short because of connections.
+fn open_files() {
+    let limit = getrlimit(Resource::Nofile);
+    let raised = Rlimit {
+        current: limit.maximum,
+        ..limit
+    };
+    if let Err(error) = setrlimit(Resource::Nofile, raised) {
+        tracing::debug!("no more than {:?} open files: {error}", limit.current);
+    }
 }
 
 /// The tokens that are needed at an address.

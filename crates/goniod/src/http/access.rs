@@ -26,6 +26,11 @@ const NEVER_HELD_UP: [&str; 5] = [
     "/api/v1/pause",
     "/api/v1/acknowledge",
 ];
+/// Whether requests to a path wait for nothing, and their connection is not closed to make room.
+pub(crate) fn never_held_up(path: &str) -> bool {
+    NEVER_HELD_UP.contains(&path)
+}
+
 /// Refusals that are logged one by one, each second; beyond, a stranger would fill the disk.
 const LOGGED_REFUSALS: NonZeroU32 = NonZeroU32::new(20).expect("20 is not 0");
 
@@ -97,7 +102,7 @@ impl Access {
                 return Err(("site", forbidden("the header Origin is missing")));
             }
         }
-        if !NEVER_HELD_UP.contains(&path) && self.requests.check().is_err() {
+        if !never_held_up(path) && self.requests.check().is_err() {
             let why = "more requests than the daemon answers; try again in a second";
             return Err(("rate", Problem::new(StatusCode::TOO_MANY_REQUESTS, why)));
         }

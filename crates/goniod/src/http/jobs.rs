@@ -1,7 +1,7 @@
 use axum::body::Bytes;
 use axum::extract::{Path, Query, State};
 use axum::http::{HeaderMap, StatusCode, header};
-use axum::response::{AppendHeaders, IntoResponse};
+use axum::response::{AppendHeaders, IntoResponse, Response};
 use axum::{Extension, Json};
 use serde::Deserialize;
 use utoipa::IntoParams;
@@ -10,7 +10,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 use super::body;
 use super::job_file::JobFile;
 use super::problem::Problem;
-use super::shared::Shared;
+use super::shared::{Shared, long_json};
 use crate::{Action, Caller, Job, JobId, PlanView, Submission};
 
 pub(crate) fn routes() -> OpenApiRouter<Shared> {
@@ -32,8 +32,11 @@ struct Naming {
 
 /// All jobs, the queue among them, in the order in which they are worked off.
 #[utoipa::path(get, path = "/jobs", tag = "queue", responses((status = 200, body = Vec<Job>)))]
-async fn jobs(State(shared): State<Shared>) -> Result<Json<Vec<Job>>, Problem> {
-    Ok(Json(shared.daemon.jobs().await?))
+async fn jobs(State(shared): State<Shared>) -> Result<Response, Problem> {
+    let daemon = shared.daemon.clone();
+    shared
+        .work(async move { long_json(daemon.jobs().await?).await })
+        .await
 }
 
 /// Add a job to the queue: a job file, TOML as config/jobs/quickstart.toml explains it, or the same keys in JSON.
@@ -58,7 +61,10 @@ async fn submit(
         return Err(Problem::new(StatusCode::UNPROCESSABLE_ENTITY, why));
     }
     let job = job_text(&headers, &text)?;
-    let job = shared.daemon.submit(&by, Submission { job, name }).await?;
+    let daemon = shared.daemon.clone();
+    let job = shared
+        .work(async move { Ok(daemon.submit(&by, Submission { job, name }).await?) })
+        .await?;
     let location = format!("/api/v1/jobs/{}", job.id);
     Ok((
         StatusCode::CREATED,
@@ -98,12 +104,11 @@ async fn act(
         (status = 409, body = Problem, content_type = "application/problem+json", description = "Not while the rig is as it is"),
         (status = 415, body = Problem, content_type = "application/problem+json", description = "Neither TOML nor JSON"),
         (status = 422, body = Problem, content_type = "application/problem+json", description = "The job file is wrong, or this rig cannot do it")))]
-async fn plan(
-    State(shared): State<Shared>,
-    headers: HeaderMap,
-    text: Bytes,
-) -> Result<Json<PlanView>, Problem> {
-    Ok(Json(shared.daemon.plan(&job_text(&headers, &text)?).await?))
+async fn plan(State(shared): State<Shared>, headers: HeaderMap, text: Bytes) -> Result<Response, Problem> {
+    let (daemon, job) = (shared.daemon.clone(), job_text(&headers, &text)?);
+    shared
+        .work(async move { long_json(daemon.plan(&job).await?).await })
+        .await
 }
 
 fn job_id(id: &str) -> Result<JobId, Problem> {

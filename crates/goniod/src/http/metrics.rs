@@ -25,6 +25,7 @@ pub(crate) struct Metrics {
     registry: Registry,
     requests: Family<Asked, Counter>,
     refused: Family<Reason, Counter>,
+    closed: Family<Reason, Counter>,
     streams: Gauge,
     jobs: Family<Standing, Gauge>,
     rig: Rig,
@@ -82,7 +83,8 @@ impl Metrics {
         let mut registry = Registry::with_prefix("goniod");
         let r = &mut registry;
         let rig = Rig::default();
-        let (requests, refused, streams, jobs) = (
+        let (requests, refused, closed, streams, jobs) = (
+            Family::default(),
             Family::default(),
             Family::default(),
             Gauge::default(),
@@ -93,6 +95,11 @@ impl Metrics {
             "http_refused",
             "Requests refused before they were looked at",
             refused.clone(),
+        );
+        r.register(
+            "http_closed",
+            "Connections closed to make room for new ones",
+            closed.clone(),
         );
         r.register(
             "event_streams",
@@ -153,6 +160,7 @@ impl Metrics {
             registry,
             requests,
             refused,
+            closed,
             streams,
             jobs,
             rig,
@@ -162,6 +170,11 @@ impl Metrics {
     /// A request was refused.
     pub(crate) fn refused(&self, reason: &'static str) {
         self.refused.get_or_create(&Reason { reason }).inc();
+    }
+
+    /// A connection was closed to make room for another: all slots were taken, or all files that may be open.
+    pub(crate) fn closed(&self, reason: &'static str) {
+        self.closed.get_or_create(&Reason { reason }).inc();
     }
 
     /// A stream of events was opened.

@@ -12,7 +12,7 @@ use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::problem::Problem;
-use super::shared::Shared;
+use super::shared::{Shared, long_json};
 use crate::{ReadingView, RunView};
 
 /// What a file of a run may do in a browser: show itself. No script, no form, no origin, nothing fetched.
@@ -40,8 +40,11 @@ pub(crate) fn routes() -> OpenApiRouter<Shared> {
 
 /// All runs, the newest first.
 #[utoipa::path(get, path = "/runs", tag = "runs", responses((status = 200, body = Vec<RunView>)))]
-async fn runs(State(shared): State<Shared>) -> Result<Json<Vec<RunView>>, Problem> {
-    Ok(Json(shared.daemon.runs().await?))
+async fn runs(State(shared): State<Shared>) -> Result<Response, Problem> {
+    let daemon = shared.daemon.clone();
+    shared
+        .work(async move { long_json(daemon.runs().await?).await })
+        .await
 }
 
 /// One run.
@@ -56,11 +59,11 @@ async fn run(State(shared): State<Shared>, Path(id): Path<String>) -> Result<Jso
 #[utoipa::path(get, path = "/runs/{id}/readings", tag = "runs", params(("id" = String, Path, description = "Id of the run")),
     responses((status = 200, body = Vec<ReadingView>),
         (status = 404, body = Problem, content_type = "application/problem+json", description = "There is no such run")))]
-async fn readings(
-    State(shared): State<Shared>,
-    Path(id): Path<String>,
-) -> Result<Json<Vec<ReadingView>>, Problem> {
-    Ok(Json(shared.daemon.readings(&id).await?))
+async fn readings(State(shared): State<Shared>, Path(id): Path<String>) -> Result<Response, Problem> {
+    let daemon = shared.daemon.clone();
+    shared
+        .work(async move { long_json(daemon.readings(&id).await?).await })
+        .await
 }
 
 /// The files of a run directory.

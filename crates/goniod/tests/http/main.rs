@@ -8,5 +8,6 @@ mod documents;
 mod limits;
 mod manual;
 mod service;
+mod slots;
 mod unix;
 mod work;
