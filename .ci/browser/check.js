@@ -4,6 +4,7 @@
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { createServer, request as forward } from "node:http";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -22,10 +23,25 @@ const rig = join(data, "rig.toml");
 // late as over the slowest adapter, a device may be silent for longer, and no watchdog takes that for a dead daemon.
 writeFileSync(rig, '[bus]\nlatency_ms = 100\nsilence_ms = 5000\n[motion]\nwatchdog_ms = 0\n[sim]\nclock = "real"\n');
 const daemon = spawn(goniod, ["--config", rig, "--data", join(data, "runs"), "--listen", "127.0.0.1:0"], { stdio: ["ignore", "pipe", "inherit"] });
-const [address] = await new Promise((resolve, reject) => {
+const [origin] = await new Promise((resolve, reject) => {
   createInterface(daemon.stdout).once("line", (line) => resolve([line]));
   daemon.once("exit", (code) => reject(new Error(`goniod ended with ${code}`)));
 });
+const tokens = readFileSync(join(data, "runs", "tokens.toml"), "utf8");
+const token = tokens.match(/^operate = "(.*)"$/m)[1];
+// The page is used below a path of its own, behind a proxy that a laboratory may have in front of it.
+const proxy = createServer((request, response) => {
+  if (!request.url.startsWith("/rig/")) { response.writeHead(404).end(); return; }
+  const passed = forward(`${origin}${request.url.slice("/rig".length)}`, { method: request.method, headers: request.headers }, (answer) => {
+    response.writeHead(answer.statusCode, answer.headers);
+    answer.pipe(response);
+  });
+  passed.on("error", () => response.destroy());
+  response.on("close", () => passed.destroy());
+  request.pipe(passed);
+});
+await new Promise((listening) => proxy.listen(0, "127.0.0.1", listening));
+const address = `http://127.0.0.1:${proxy.address().port}/rig`;
 const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: ["--no-sandbox"] });
 const WIDE = { width: 1280, height: 900 };
 const NARROW = { width: 390, height: 844 };
@@ -38,8 +54,11 @@ async function open(options, hash = "") {
   page.on("console", (message) => { if (["error", "warning"].includes(message.type())) complaints.push(`console: ${message.text()} (${message.location().url})`); });
   page.on("pageerror", (error) => complaints.push(`page: ${error.stack}`));
   page.on("request", (request) => { if (!request.url().startsWith(address) && !request.url().startsWith("data:")) complaints.push(`fetched ${request.url()}`); });
-  await page.goto(`${address}/${hash}`);
+  // As the link that goniod prints to a terminal.
+  await page.goto(`${address}/#token=${token}`);
   await page.getByText("connected", { exact: true }).waitFor();
+  assert.equal(page.url(), `${address}/`, "the token does not stay in the address bar");
+  await page.evaluate((hash) => { location.hash = hash; }, hash);
   return page;
 }
 
@@ -77,7 +96,7 @@ async function look(name) {
 const dots = (page, plot) => page.locator(`#plot-${plot} circle:not(.marked)`).count();
 const angle = async (page, arm) => page.locator(`#${arm}`).textContent();
 const checks = (page) => page.frameLocator("#report-frame").getByRole("heading", { name: "Checks" });
-const view = async () => (await fetch(`${address}/api/v1/rig`)).json();
+const view = async () => (await fetch(`${origin}/api/v1/rig`, { headers: { Authorization: `Bearer ${token}` } })).json();
 const until = async (what, holds) => {
   const end = Date.now() + LONG;
   while (!(await holds())) {
@@ -88,6 +107,16 @@ const until = async (what, holds) => {
 
 let main;
 try {
+  console.log("signs in: not with a wrong token, and not without one");
+  for (const hash of ["", `#token=${"0".repeat(64)}`]) {
+    const page = await (await browser.newContext({ viewport: WIDE })).newPage();
+    page.setDefaultTimeout(LONG);
+    await page.goto(`${address}/${hash}`);
+    await page.getByRole("heading", { name: "Sign in" }).waitFor();
+    assert.equal(page.url(), `${address}/`, "no token stays in the address bar");
+    await page.screenshot({ path: join(shots, `sign-in${hash ? "-refused" : ""}.png`) });
+    await page.context().close();
+  }
   main = await open({ viewport: WIDE, colorScheme: "light" });
   await until("the arms", async () => (await angle(main, "light")) !== "–");
   await look("idle");
@@ -177,6 +206,7 @@ try {
   console.log("the page is sound");
 } finally {
   await browser.close();
+  proxy.close();
   daemon.kill("SIGTERM");
   await new Promise((resolve) => daemon.once("exit", resolve));
   rmSync(data, { recursive: true });

@@ -30,6 +30,7 @@ import subprocess
 import sys
 import tempfile
 import time
+import tomllib
 import tty
 from pathlib import Path
 
@@ -84,6 +85,8 @@ class Daemon:
             stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=os.environ | {"RUST_LOG": "warn"}, text=True)
         address = self.process.stdout.readline().strip()
         self.host, port = address.removeprefix("http://").split(":")
+        # Made before it says where it listens.
+        self.token = tomllib.loads(Path(self.data, "tokens.toml").read_text())["operate"]
         self.port = int(port)
         asyncio.run(self.ask("GET", "/health"))
         self.start_ms = (time.monotonic() - begun) * 1e3
@@ -104,6 +107,7 @@ class Daemon:
         """A request on a connection of its own: (status, body)."""
         reader, writer = await asyncio.open_connection(self.host, self.port)
         head = (f"{method} {path} HTTP/1.1\r\nHost: {self.host}:{self.port}\r\nConnection: close\r\n"
+                f"Authorization: Bearer {self.token}\r\n"
                 f"Content-Type: {kind}\r\nContent-Length: {len(body)}\r\n\r\n")
         writer.write((head + body).encode())
         answer = await reader.read()
@@ -124,7 +128,8 @@ class Daemon:
     async def events(self):
         """What happens, for as long as somebody asks for more."""
         reader, writer = await asyncio.open_connection(self.host, self.port)
-        writer.write(f"GET /api/v1/events HTTP/1.1\r\nHost: {self.host}:{self.port}\r\n\r\n".encode())
+        writer.write((f"GET /api/v1/events HTTP/1.1\r\nHost: {self.host}:{self.port}\r\n"
+                      f"Authorization: Bearer {self.token}\r\n\r\n").encode())
         try:
             while line := await reader.readline():
                 if line.startswith(b"data: "):

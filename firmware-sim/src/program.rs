@@ -1,15 +1,13 @@
 use std::error::Error;
-use std::io::{BufRead, IsTerminal, Write};
+use std::io::BufRead;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
 use rig::RigFile;
+use terminal::{LevelFilter, LogFormat};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc;
-use tracing_subscriber::filter::{LevelFilter, Targets};
-use tracing_subscriber::layer::SubscriberExt;
-use tracing_subscriber::util::SubscriberInitExt;
 
 use crate::{Bench, Clock, Order, Server, WireSettings};
 
@@ -46,16 +44,13 @@ struct Arguments {
 /// Runs `firmware-sim` with the arguments of this process: serves until SIGINT or SIGTERM, then returns 0; 2 for bad
 /// arguments or a bad rig file.
 pub fn main() -> ExitCode {
-    let filter = std::env::var("RUST_LOG")
-        .ok()
-        .and_then(|text| text.parse::<Targets>().ok())
-        .unwrap_or_else(|| Targets::new().with_default(LevelFilter::INFO));
-    let log = tracing_subscriber::fmt::layer()
-        .with_ansi(std::io::stderr().is_terminal())
-        .with_writer(std::io::stderr);
+    let arguments = match terminal::arguments() {
+        Ok(arguments) => arguments,
+        Err(code) => return code,
+    };
     // A test may have set a subscriber already; then that one stays.
-    let _ = tracing_subscriber::registry().with(filter).with(log).try_init();
-    match run(Arguments::parse()) {
+    terminal::log(LogFormat::Human, LevelFilter::INFO);
+    match run(arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             let mut text = error.to_string();
@@ -64,7 +59,7 @@ pub fn main() -> ExitCode {
                 text = format!("{text}: {error}");
                 cause = error.source();
             }
-            eprintln!("firmware-sim: {text}");
+            terminal::say(format_args!("firmware-sim: {text}"));
             ExitCode::from(2)
         }
     }
@@ -99,7 +94,7 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
         if let Some(path) = &arguments.trace {
             trace::keep(path, &server)?;
         }
-        writeln!(std::io::stdout(), "{}", server.path().display())?;
+        terminal::line(server.path().display())?;
         tracing::info!(wire_time = arguments.wire_time, "serving");
         let mut orders = if arguments.orders {
             listen()
@@ -144,5 +139,5 @@ fn obey(line: &str, rig: &mut RigFile, server: &mut Server) {
         Err(error) => format!("refused: {error}"),
     };
     // Nobody may be listening.
-    let _ = writeln!(std::io::stdout(), "{answer}");
+    let _ = terminal::line(answer);
 }

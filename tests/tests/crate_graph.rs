@@ -5,15 +5,16 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What each crate stands on; it may also name what those stand on.
-const EDGES: [(&str, &[&str]); 14] = [
+const EDGES: [(&str, &[&str]); 15] = [
     ("arms", &[]),
     ("brdf", &[]),
+    ("terminal", &[]),
     ("pdv", &["brdf"]),
     ("sweep", &["pdv", "arms"]),
     ("rig", &["arms"]),
     ("capture", &["sweep", "rig", "pdv"]),
     ("report", &["capture", "pdv", "brdf"]),
-    ("firmware-sim", &["brdf", "arms", "rig"]),
+    ("firmware-sim", &["brdf", "arms", "rig", "terminal"]),
     ("study", &["report", "firmware-sim"]),
     ("session", &["report", "firmware-sim"]),
     ("api", &[]),
@@ -116,10 +117,10 @@ fn needs(package: &str) -> BTreeSet<String> {
         .args(["--edges", "normal,build", "--prefix", "none", "--format", "{p}"])
         .current_dir(root())
         .output()
-        .unwrap();
+        .expect("cargo can be run where tests are");
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "cargo tree: {said}");
-    let listed = String::from_utf8(output.stdout).unwrap();
+    let listed = String::from_utf8(output.stdout).expect("names of crates are text");
     let name = |line: &str| line.split(' ').next().unwrap_or_default().to_owned();
     listed.lines().map(name).collect()
 }

@@ -52,6 +52,7 @@ impl Service {
             .args(arguments)
             .current_dir(self.directory.path())
             .env("GONIOD_URL", &self.address)
+            .env("GONIOD_TOKEN_FILE", "data/tokens.toml")
             .env_remove("RUST_LOG");
         command
     }
@@ -399,9 +400,10 @@ fn what_is_wrong_is_told_and_has_its_exit_code() {
 }
 
 #[test]
-fn a_token_is_needed_where_the_daemon_wants_one() {
+fn a_token_is_needed_over_tcp() {
     let service = Service::start(&["--listen", "127.0.0.1:0", "--tokens", "tokens.toml"]);
-    let refused = service.gonioctl(&["jobs"]).expect(5);
+    let mut without = service.command(&["jobs"]);
+    let refused = Finished::from(without.env_remove("GONIOD_TOKEN_FILE").output().unwrap()).expect(5);
     assert!(refused.stderr.contains("--token-file"), "{}", refused.stderr);
     let _ = service
         .gonioctl(&["jobs", "--token-file", "tokens.toml"])

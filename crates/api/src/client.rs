@@ -1,6 +1,8 @@
 //! The client of the daemon's HTTP API.
 
 mod error;
+mod place;
+mod roots;
 mod stream;
 mod unix;
 
@@ -12,6 +14,7 @@ use serde::Deserialize;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use ureq::http::{Method, Request};
+use ureq::tls::TlsConfig;
 use ureq::unversioned::resolver::DefaultResolver;
 use ureq::{Agent, Body, SendBody};
 
@@ -19,6 +22,8 @@ pub use error::{ClientError, Refused};
 pub use stream::{Message, ServerSentEvent, Stream};
 
 use crate::{Action, Job, JobId, Jog, RigView, RunView};
+use place::Place;
+use roots::roots;
 use unix::UnixConnector;
 
 /// A daemon on this machine answers at once; one at the end of a poor line should have by then.
@@ -27,8 +32,8 @@ const CONNECT: Duration = Duration::from_secs(5);
 /// A quiet stream of events says every ten seconds that it lives; one that says nothing for so long is dead.
 const QUIET: Duration = Duration::from_secs(30);
 
-/// Where a daemon listens unless told otherwise.
-const USUAL: &str = "http://127.0.0.1:4664";
+/// What an address behind a TLS proxy begins with.
+const HTTPS: &str = "https://";
 
 /// What the address of a socket file begins with.
 const UNIX: &str = "unix:";
@@ -38,22 +43,41 @@ pub struct Client {
     agent: Agent,
     /// As given, for messages.
     address: String,
+    /// Where it was looked for, unless it was named.
+    place: Option<Place>,
     /// What paths are appended to.
     base: String,
     token: Option<String>,
 }
 
 impl Client {
-    /// The client of the daemon at an address, or at the usual one; it reads its token from a file where one is named.
-    /// Asks nothing yet.
+    /// The client of the daemon at an address, else of the daemon of this computer: on a socket where it listens on one,
+    /// else over TCP. Asks nothing yet.
+    ///
+    /// It reads its token from a file where one is named, and takes the word of the authorities in the file `ca`, else of
+    /// those of the system, for who a daemon behind https is.
     ///
     /// # Errors
-    /// An address that is none, a token file that holds none.
-    pub fn new(address: Option<&str>, token_file: Option<&Path>) -> Result<Self, ClientError> {
-        let address = address.unwrap_or(USUAL);
-        let address = address.trim_end_matches('/').to_owned();
-        // No proxy: the daemon is here, or at the end of a tunnel.
+    /// An address that is none, a token file that holds none, a file of certificates that holds none.
+    pub fn new(
+        address: Option<&str>,
+        token_file: Option<&Path>,
+        ca: Option<&Path>,
+    ) -> Result<Self, ClientError> {
+        let (address, place) = match address {
+            Some(address) => (address.trim_end_matches('/').to_owned(), None),
+            None => {
+                let place = Place::find();
+                (place.address.clone(), Some(place))
+            }
+        };
+        let mut tls = TlsConfig::builder();
+        if address.starts_with(HTTPS) {
+            tls = tls.root_certs(roots(ca)?);
+        }
+        // No proxy of the environment: a proxy of the daemon's is its address.
         let config = Agent::config_builder()
+            .tls_config(tls.build())
             .proxy(None)
             .http_status_as_error(false)
             .max_redirects(0)
@@ -66,16 +90,20 @@ impl Client {
                 (agent, "http://localhost".to_owned())
             }
             None => {
-                if !address.starts_with("http://") {
+                if !address.starts_with("http://") && !address.starts_with(HTTPS) {
                     return Err(ClientError::Address { address });
                 }
                 (Agent::new_with_config(config), address.clone())
             }
         };
+        // On the socket of this computer's daemon a user is known without one.
+        let known = place.is_some() && address.starts_with(UNIX);
+        let token_file = token_file.filter(|_| !known);
         let token = token_file.map(token).transpose()?;
         Ok(Self {
             agent,
             address,
+            place,
             base,
             token,
         })
@@ -174,7 +202,9 @@ impl Client {
         media_type: &str,
         text: &str,
     ) -> Result<T, ClientError> {
-        let headers = [("content-type", media_type)];
+        // Not in chunks of unknown number, which not every proxy passes on.
+        let length = text.len().to_string();
+        let headers = [("content-type", media_type), ("content-length", &length)];
         let answer = self.send(
             Method::POST,
             path,
@@ -190,7 +220,8 @@ impl Client {
     /// As [`Client::read`].
     pub fn act_on(&self, path: &str, what: &impl Serialize) -> Result<(), ClientError> {
         let text = serde_json::to_string(what).map_err(|source| self.garbled(source))?;
-        let headers = [("content-type", "application/json")];
+        let length = text.len().to_string();
+        let headers = [("content-type", "application/json"), ("content-length", &length)];
         let body = &mut text.as_bytes();
         self.send(Method::POST, path, &headers, SendBody::from_reader(body))
             .map(drop)
@@ -255,9 +286,24 @@ impl Client {
     fn unreachable(&self, source: ureq::Error) -> ClientError {
         ClientError::Unreachable {
             address: self.address.clone(),
+            remedy: match &self.place {
+                _ if is_about_trust(&source) => {
+                    "; its certificate is not of an authority that this computer knows: name the file of its authority with --ca"
+                        .to_owned()
+                }
+                Some(place) => place.remedy(),
+                None => "; is it running (`systemctl status goniod`), and is the address right (--daemon)?"
+                    .to_owned(),
+            },
             source: Box::new(source),
         }
     }
+}
+
+/// Whether the other end is there, and it is not known who it is.
+fn is_about_trust(error: &ureq::Error) -> bool {
+    let text = error.to_string();
+    text.contains("certificate") || matches!(error, ureq::Error::Tls(_))
 }
 
 /// The token in a file: the daemon's own token file, of which the one that operates is taken, or a token alone.
@@ -287,7 +333,7 @@ mod tests {
     use super::*;
 
     fn client(address: &str) -> Result<Client, ClientError> {
-        Client::new(Some(address), None)
+        Client::new(Some(address), None, None)
     }
 
     #[test]
@@ -296,6 +342,7 @@ mod tests {
         assert!(client("unix:/run/goniod/socket").is_ok());
         let error = client("127.0.0.1:4664").err().unwrap();
         assert!(error.to_string().contains("http://HOST:PORT"), "{error}");
+        assert!(client("https://lab.example/rig/").is_ok());
     }
 
     #[test]

@@ -4,7 +4,6 @@ use std::process::ExitCode;
 use api::{Acknowledgement, Client, FaultId, FaultView};
 
 use crate::error::CommandError;
-use crate::print;
 
 /// Acknowledges the newest latched fault: the one that is named, else the one that is shown and confirmed on the
 /// terminal.
@@ -18,13 +17,13 @@ pub(crate) fn acknowledge(daemon: &Client, fault: Option<&str>, as_json: bool) -
         None => confirmed(daemon)?,
     };
     daemon.act_on("/acknowledge", &Acknowledgement { fault: id.clone() })?;
-    print::say(format_args!("fault {id} is acknowledged; nothing starts by that"));
+    terminal::say(format_args!("fault {id} is acknowledged; nothing starts by that"));
     let rig = daemon.rig()?;
     if let Some(fault) = &rig.fault {
-        print::say(format_args!("still latched: {}", described(fault)));
+        terminal::say(format_args!("still latched: {}", described(fault)));
     }
     if as_json {
-        print::json(&rig)?;
+        terminal::json(&rig)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -34,7 +33,7 @@ fn confirmed(daemon: &Client) -> anyhow::Result<FaultId> {
     let Some(fault) = daemon.rig()?.fault else {
         return Err(CommandError::Absent("no fault is latched").into());
     };
-    print::say(described(&fault));
+    terminal::say(described(&fault));
     anyhow::ensure!(
         io::stdin().is_terminal(),
         "nobody can be asked here whether the rig was looked at; name the fault: --fault {}",

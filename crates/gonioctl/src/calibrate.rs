@@ -8,10 +8,10 @@ use session::{Calibrated, Calibration};
 use tokio::sync::watch;
 
 use crate::cli::{CalibrateArguments, OnStage};
+use crate::exit;
 use crate::progress::Progress;
 use crate::run::obey;
 use crate::signals::Signals;
-use crate::{exit, print};
 
 /// Takes the readings of a standard and stores what they say.
 ///
@@ -39,7 +39,7 @@ pub(crate) fn calibrate(arguments: &CalibrateArguments) -> anyhow::Result<ExitCo
         anyhow::Ok(calibrated?)
     })?;
     if arguments.output.json {
-        print::json(&json!({
+        terminal::json(&json!({
             "outcome": calibrated.outcome,
             "directory": calibrated.directory,
             "certificate": calibrated.certificate.as_ref().map(|(certificate, _)| certificate),
@@ -47,7 +47,7 @@ pub(crate) fn calibrate(arguments: &CalibrateArguments) -> anyhow::Result<ExitCo
     } else {
         say(&calibrated);
         if let Some((_, path)) = &calibrated.certificate {
-            print::line(path.display())?;
+            terminal::line(path.display())?;
         }
     }
     Ok(exit::code(calibrated.status()))
@@ -73,21 +73,21 @@ fn standard(stage: &OnStage) -> anyhow::Result<Standard> {
 fn say(calibrated: &Calibrated) {
     match &calibrated.outcome {
         Outcome::Done => {}
-        Outcome::Stopped => print::say("stopped; no certificate was made"),
-        Outcome::Failed { fault } => print::say(format_args!("failed: {fault}; no certificate was made")),
+        Outcome::Stopped => terminal::say("stopped; no certificate was made"),
+        Outcome::Failed { fault } => terminal::say(format_args!("failed: {fault}; no certificate was made")),
     }
     let Some((certificate, _)) = &calibrated.certificate else {
         return;
     };
-    print::say(format_args!("calibration {}", certificate.id));
+    terminal::say(format_args!("calibration {}", certificate.id));
     if let Some(white) = &certificate.white {
         let [r, g, b] = white.responsivity;
         let u = white.u_responsivity.into_iter().fold(0.0, f64::max);
-        print::say(format_args!(
+        terminal::say(format_args!(
             "white     responsivity {r:.4}, {g:.4}, {b:.4} (± {:.2} %, k = 2)",
             200.0 * u
         ));
-        print::say(format_args!(
+        terminal::say(format_args!(
             "          gains ×1, ×{:.3}, ×{:.2}; {:.3} % lost at full scale",
             white.gains[1],
             white.gains[2],
@@ -100,25 +100,25 @@ fn say(calibrated: &Calibrated) {
             .iter()
             .flat_map(|(_, rates)| *rates)
             .fold(0.0, f64::max);
-        print::say(format_args!(
+        terminal::say(format_args!(
             "trap      stray light at {} poses, at most {most:.2e} counts/µs",
             trap.points.len()
         ));
     }
     if let Some(zero) = &certificate.zero {
-        print::say(format_args!(
+        terminal::say(format_args!(
             "mirror    {:.3}° to be added to each angle (± {:.3}°, k = 2)",
             zero.offset_rad.to_degrees(),
             2.0 * zero.u_rad.to_degrees()
         ));
     }
     match (&certificate.colour, certificate.patches.len()) {
-        (Some(colour), n) => print::say(format_args!(
+        (Some(colour), n) => terminal::say(format_args!(
             "colour    matrix of {n} patches, {:.2} % left over",
             100.0 * colour.residual
         )),
         (None, 0) => {}
-        (None, n) => print::say(format_args!(
+        (None, n) => terminal::say(format_args!(
             "colour    {n} patches; a matrix needs three that differ"
         )),
     }

@@ -6,7 +6,7 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 use session::Status;
 use study::{Campaign, Script, Wrong};
 
-use crate::{exit, print};
+use crate::exit;
 
 /// Fresh seeds are below this, so that they are short enough to be typed.
 const SEEDS: u64 = 1_000_000_000;
@@ -26,7 +26,7 @@ pub(crate) fn campaign(
         since.as_micros() as u64 % SEEDS
     };
     let seed = seed.unwrap_or_else(fresh);
-    print::say(format_args!("{captures} captures, seed {seed}"));
+    terminal::say(format_args!("{captures} captures, seed {seed}"));
     let begun = Instant::now();
     let told = AtomicU64::new(0);
     let campaigned = Campaign {
@@ -37,10 +37,10 @@ pub(crate) fn campaign(
     .run(&|done, of| {
         let tenth = 10 * done / of.max(1);
         if told.fetch_max(tenth, Ordering::Relaxed) < tenth {
-            print::say(format_args!("{done} of {of}"));
+            terminal::say(format_args!("{done} of {of}"));
         }
     });
-    print::say(format_args!(
+    terminal::say(format_args!(
         "{} captures with {} faults in {:.1} s: {} executions, {} readings true within their uncertainty",
         campaigned.captures,
         campaigned.faults,
@@ -49,10 +49,13 @@ pub(crate) fn campaign(
         campaigned.readings
     ));
     if as_json {
-        print::json(&campaigned)?;
+        terminal::json(&campaigned)?;
     } else {
         for Wrong { script, why } in &campaigned.wrong {
-            print::line(format_args!("# {}\n{script}", why.replace('\n', " ")))?;
+            terminal::line(format_args!("# {}", why.replace('\n', " ")))?;
+            for line in script.to_string().lines() {
+                terminal::line(line)?;
+            }
         }
     }
     Ok(verdict(campaigned.wrong.is_empty()))
@@ -65,12 +68,12 @@ pub(crate) fn campaign(
 pub(crate) fn replay(script: &Path, as_json: bool) -> anyhow::Result<ExitCode> {
     let carried = Script::read(script)?.carry();
     match &carried {
-        Ok(carried) if as_json => print::json(carried)?,
-        Ok(carried) => print::line(format_args!(
+        Ok(carried) if as_json => terminal::json(carried)?,
+        Ok(carried) => terminal::line(format_args!(
             "{} executions, {} readings true within their uncertainty",
             carried.executions, carried.readings
         ))?,
-        Err(why) => print::line(why)?,
+        Err(why) => terminal::line(why)?,
     }
     Ok(verdict(carried.is_ok()))
 }

@@ -1,5 +1,6 @@
 use std::path::PathBuf;
 
+use api::client::Refused;
 use api::{Client, ClientError, JobId};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
@@ -302,21 +303,34 @@ pub(crate) struct RigArgument {
 /// Which daemon.
 #[derive(Debug, Args)]
 pub(crate) struct DaemonArguments {
-    /// Where the daemon listens: http://HOST:PORT or unix:PATH [default: http://127.0.0.1:4664].
+    /// Where the daemon is: unix:PATH, http://HOST:PORT, or https://HOST/PATH [default: the socket
+    /// $XDG_RUNTIME_DIR/goniod.sock or /run/goniod/goniod.sock, else http://127.0.0.1:4664].
     #[arg(long, value_name = "ADDRESS", env = "GONIOD_URL")]
     pub(crate) daemon: Option<String>,
-    /// File with a token, where the daemon wants one: the token alone, or the daemon's tokens.toml.
+    /// File with the token that is needed over TCP: the token alone, or the daemon's tokens.toml.
     #[arg(long, value_name = "FILE", env = "GONIOD_TOKEN_FILE")]
     pub(crate) token_file: Option<PathBuf>,
+    /// File with the certificates (PEM) of who vouches for the daemon's https, instead of the system's.
+    #[arg(long, value_name = "FILE", env = "GONIOD_CA")]
+    pub(crate) ca: Option<PathBuf>,
 }
 
 impl DaemonArguments {
+    /// Whether nobody asked for a daemon that refuses so: it is not named, and wants a token that was not given.
+    pub(crate) fn is_unasked(&self, refused: &Refused) -> bool {
+        self.daemon.is_none() && self.token_file.is_none() && refused.unauthorized()
+    }
+
     /// The client of that daemon; asks nothing yet.
     ///
     /// # Errors
-    /// An address that is none, a token file that holds none.
+    /// As [`Client::new`].
     pub(crate) fn client(&self) -> Result<Client, ClientError> {
-        Client::new(self.daemon.as_deref(), self.token_file.as_deref())
+        Client::new(
+            self.daemon.as_deref(),
+            self.token_file.as_deref(),
+            self.ca.as_deref(),
+        )
     }
 }
 

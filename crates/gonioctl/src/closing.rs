@@ -3,8 +3,8 @@ use std::path::PathBuf;
 use serde_json::{Value, json};
 use session::{Ended, Status};
 
+use crate::eval;
 use crate::progress::clock;
-use crate::{eval, print};
 
 /// A run that has ended, as its files tell it; whoever captured it, the words are the same.
 pub(crate) struct Closing {
@@ -59,38 +59,38 @@ impl Closing {
     pub(crate) fn say(&self, wall_s: f64) {
         let Self { run, report, .. } = self;
         match self.status {
-            Status::Done => print::say("done"),
-            Status::Stopped => print::say("stopped; the readings so far are safe"),
-            _ => print::say(format_args!(
+            Status::Done => terminal::say("done"),
+            Status::Stopped => terminal::say("stopped; the readings so far are safe"),
+            _ => terminal::say(format_args!(
                 "failed: {}",
                 run["fault"].as_str().unwrap_or("see above")
             )),
         }
         let rig_s = run["seconds"]["total"].as_f64().unwrap_or_default();
-        print::say(format_args!(
+        terminal::say(format_args!(
             "rig time  {} ({rig_s:.1} s; what a real rig takes)",
             clock(rig_s)
         ));
-        print::say(format_args!("wall time {wall_s:.1} s"));
+        terminal::say(format_args!("wall time {wall_s:.1} s"));
         let readings = &run["readings"];
-        print::say(format_args!(
+        terminal::say(format_args!(
             "readings  {} taken, {} of {} steps done, {} retries on the bus",
             readings["taken"], readings["accepted"], readings["planned"], run["retries"]
         ));
         for why in report["adapted"]["added"].as_array().into_iter().flatten() {
-            print::say(format_args!("added     {}", why.as_str().unwrap_or_default()));
+            terminal::say(format_args!("added     {}", why.as_str().unwrap_or_default()));
         }
         if let Some(why) = report["adapted"]["stopped"].as_str() {
-            print::say(format_args!("ended     {why}"));
+            terminal::say(format_args!("ended     {why}"));
         }
         if !report["errors"].is_null() {
-            print::say("errors against the simulated specimen");
+            terminal::say("errors against the simulated specimen");
             for line in eval::lines(&report["errors"]) {
-                print::say(line);
+                terminal::say(line);
             }
         }
         if self.status != Status::Done {
-            print::say(format_args!("go on with: {}", self.again));
+            terminal::say(format_args!("go on with: {}", self.again));
         }
     }
 }

@@ -5,7 +5,6 @@ use rig::conform;
 use session::OpenRig;
 
 use crate::findings::Findings;
-use crate::print;
 use crate::signals::Signals;
 
 /// Tries whether a rig behaves as this program expects of it; moves the arms.
@@ -27,7 +26,7 @@ pub(crate) fn conform(rig: Option<&Path>, restart: bool, as_json: bool) -> anyho
         tokio::select! {
             () = conform::conform(drive, restart, &mut tell) => {}
             () = signals.next() => {
-                print::say("interrupted; the arms stop, the lamp goes off");
+                terminal::say("interrupted; the arms stop, the lamp goes off");
                 drive.stop_all().await;
                 drive.disengage_all().await;
                 anyhow::bail!("the suite was interrupted");

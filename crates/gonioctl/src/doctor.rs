@@ -6,7 +6,6 @@ use rig::{Device, Drive, Dynamixel, RigFile};
 use session::RigPort;
 
 use crate::findings::Findings;
-use crate::print;
 use crate::signals::Signals;
 
 /// Checks a rig without moving it, and says what to do about what is wrong.
@@ -43,7 +42,7 @@ fn examine(port: &Path, file: &RigFile, out: &Path, tell: &mut dyn FnMut(Finding
         tokio::select! {
             () = ask(&mut drive, &present, tell) => {}
             () = signals.next() => {
-                print::say("interrupted; the lamp goes off");
+                terminal::say("interrupted; the lamp goes off");
                 drive.lamp(false).await?;
             }
         }

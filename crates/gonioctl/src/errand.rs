@@ -12,7 +12,7 @@ use crate::cli::DaemonArguments;
 use crate::closing::Closing;
 use crate::error::CommandError;
 use crate::signals::{STEPS, Signals};
-use crate::{print, queue, watch};
+use crate::{queue, watch};
 
 /// A job that a daemon carries out while its client waits.
 pub(crate) struct Errand {
@@ -34,6 +34,10 @@ impl Errand {
         let daemon = arguments.client()?;
         let text = match daemon.read_text("/rig/file") {
             Err(ClientError::Unreachable { .. }) if arguments.daemon.is_none() => return Ok(None),
+            Err(ClientError::Refused(refused)) if arguments.is_unasked(&refused) => {
+                terminal::say(format_args!("a daemon runs here that is not asked: {refused}"));
+                return Ok(None);
+            }
             text => text?,
         };
         if arguments.daemon.is_none() || rig.is_some() {
@@ -44,7 +48,7 @@ impl Errand {
                     arguments.daemon.is_none(),
                     "--rig: the daemon drives another rig than {name}"
                 );
-                print::say(format_args!(
+                terminal::say(format_args!(
                     "the daemon drives another rig than {name}; it is not asked"
                 ));
                 return Ok(None);
@@ -164,12 +168,12 @@ async fn obey(mut signals: Signals, daemon: Arc<Client>) {
             Command::Estop => "/estop",
             _ => "/finish",
         };
-        print::say(word);
+        terminal::say(word);
         let daemon = daemon.clone();
         // Not waited for: the emergency stop must not wait for an answer to what was asked before.
         tokio::task::spawn_blocking(move || {
             let Err(error) = daemon.act(path) else { return };
-            print::say(format_args!("gonioctl: {error}"));
+            terminal::say(format_args!("gonioctl: {error}"));
             if matches!(error, ClientError::Unreachable { .. }) {
                 // Nobody is there who could obey; the rig's own watchdogs stop it.
                 process::exit(Status::Daemon.code().into());

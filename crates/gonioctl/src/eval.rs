@@ -5,8 +5,6 @@ use brdf::{Brdf, MerlTable};
 use pdv::{Draw, compare};
 use serde_json::Value;
 
-use crate::print;
-
 /// Compares two BRDFs by every metric.
 ///
 /// # Errors
@@ -16,10 +14,10 @@ pub(crate) fn eval(truth: &str, estimate: &str, as_json: bool) -> anyhow::Result
     let comparison = compare(&truth, &[&estimate], &Draw::default()).remove(0);
     let comparison = serde_json::to_value(comparison)?;
     if as_json {
-        print::json(&comparison)?;
+        terminal::json(&comparison)?;
     } else {
         for line in lines(&comparison) {
-            print::line(line)?;
+            terminal::line(line)?;
         }
     }
     Ok(())

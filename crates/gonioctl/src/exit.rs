@@ -25,9 +25,10 @@ fn status(error: &(dyn Error + 'static)) -> Option<Status> {
     }
     if let Some(error) = error.downcast_ref::<ClientError>() {
         return Some(match error {
-            ClientError::Address { .. } | ClientError::TokenFile { .. } | ClientError::NoToken { .. } => {
-                Status::Invalid
-            }
+            ClientError::Address { .. }
+            | ClientError::TokenFile { .. }
+            | ClientError::Authorities { .. }
+            | ClientError::NoToken { .. } => Status::Invalid,
             ClientError::Refused(refused) if refused.invalid() => Status::Invalid,
             _ => Status::Daemon,
         });

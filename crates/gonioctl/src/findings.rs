@@ -4,7 +4,7 @@ use rig::doctor::{Bin, Finding, Verdict};
 use serde_json::json;
 use session::Status;
 
-use crate::{exit, print};
+use crate::exit;
 
 /// Widest bar of the histogram, characters.
 const BAR: usize = 40;
@@ -39,7 +39,7 @@ impl Findings {
     pub(crate) fn end(self, rig: &std::path::Path) -> anyhow::Result<ExitCode> {
         let worst = self.all.iter().map(|finding| finding.verdict).max();
         if self.as_json {
-            print::json(&json!({ "rig": rig, "verdict": worst, "findings": self.all }))?;
+            terminal::json(&json!({ "rig": rig, "verdict": worst, "findings": self.all }))?;
         }
         Ok(match worst {
             Some(Verdict::Fail) => exit::code(Status::Rig),
@@ -49,15 +49,15 @@ impl Findings {
 }
 
 fn show(finding: &Finding) -> std::io::Result<()> {
-    print::line(format_args!(
+    terminal::line(format_args!(
         "{:<4}  {:<15}{}",
         finding.verdict, finding.check, finding.text
     ))?;
     if let Some(remedy) = &finding.remedy {
-        print::line(format_args!("{:<21}-> {remedy}", ""))?;
+        terminal::line(format_args!("{:<21}-> {remedy}", ""))?;
     }
     for line in bars(&finding.histogram) {
-        print::line(format_args!("{:<21}{line}", ""))?;
+        terminal::line(format_args!("{:<21}{line}", ""))?;
     }
     Ok(())
 }

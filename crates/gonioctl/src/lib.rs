@@ -19,7 +19,6 @@ mod manual;
 mod operator;
 mod plan;
 mod ports;
-mod print;
 mod progress;
 mod queue;
 mod reconstruct;
@@ -32,24 +31,23 @@ mod watch;
 use std::process::ExitCode;
 
 use arms::{Arm, ArmAngle};
-use clap::Parser;
 use cli::{ArmName, Cli, Command, DaemonArguments, Output};
 use operator::OperatorCommand;
 use run::Task;
-use tracing::level_filters::LevelFilter;
-use tracing_subscriber::layer::SubscriberExt;
-use tracing_subscriber::util::SubscriberInitExt;
+use terminal::{LevelFilter, LogFormat};
 
 /// Runs the command line of this process and returns its exit code.
 pub fn main() -> ExitCode {
-    let log = tracing_subscriber::fmt::layer().with_writer(std::io::stderr);
-    let filter = session::log_filter(LevelFilter::WARN);
-    tracing_subscriber::registry().with(log).with(filter).init();
-    match command(Cli::parse().command) {
+    let cli: Cli = match terminal::arguments() {
+        Ok(cli) => cli,
+        Err(code) => return code,
+    };
+    terminal::log(LogFormat::Human, LevelFilter::WARN);
+    match command(cli.command) {
         Ok(code) => code,
         Err(error) => {
             let (code, text) = exit::failure(&error);
-            print::say(format_args!("gonioctl: {text}"));
+            terminal::say(format_args!("gonioctl: {text}"));
             code
         }
     }

@@ -6,7 +6,7 @@ use arms::{Arm, ArmAngle};
 use session::Status;
 
 use crate::error::CommandError;
-use crate::{exit, print};
+use crate::exit;
 
 /// What an operator has the rig do, whatever job is under way.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,9 +40,9 @@ impl OperatorCommand {
             }
             Self::Jog(..) | Self::Park => return self.drive(daemon, as_json),
         };
-        print::say(said);
+        terminal::say(said);
         if as_json {
-            print::json(&daemon.rig()?)?;
+            terminal::json(&daemon.rig()?)?;
         }
         Ok(ExitCode::SUCCESS)
     }
@@ -68,14 +68,14 @@ impl OperatorCommand {
         let rig = daemon.rig()?;
         for (arm, view) in Arm::BOTH.into_iter().zip(&rig.arms) {
             if let Some(angle_deg) = view.measured_deg {
-                print::say(format_args!("{arm} arm at {angle_deg:.2}°"));
+                terminal::say(format_args!("{arm} arm at {angle_deg:.2}°"));
             }
         }
         if as_json {
-            print::json(&rig)?;
+            terminal::json(&rig)?;
         }
         if let Some(fault) = rig.fault {
-            print::say(format_args!("FAULT: {}", fault.text));
+            terminal::say(format_args!("FAULT: {}", fault.text));
             return Ok(exit::code(Status::Rig));
         }
         Ok(ExitCode::SUCCESS)

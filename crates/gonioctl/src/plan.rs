@@ -4,7 +4,6 @@ use serde_json::json;
 use session::RunRequest;
 use sweep::{Light, Plan, Sweep, Until};
 
-use crate::print;
 use crate::progress::clock;
 
 /// Says what a job would do; touches no hardware.
@@ -15,7 +14,7 @@ pub(crate) fn plan(job: &Path, rig: Option<&Path>, as_json: bool) -> anyhow::Res
     let order = RunRequest::read(job, rig)?;
     let plan = order.plan(None)?;
     if as_json {
-        print::json(&json!({
+        terminal::json(&json!({
             "seconds": plan.seconds(),
             "overhead_s": plan.overhead_s,
             "readings": plan.steps.len(),
@@ -29,7 +28,7 @@ pub(crate) fn plan(job: &Path, rig: Option<&Path>, as_json: bool) -> anyhow::Res
     }
     list(&plan, order.light(&plan))?;
     if let Some(until) = order.job.until {
-        print::line(then(until))?;
+        terminal::line(then(until))?;
     }
     Ok(())
 }
@@ -93,36 +92,36 @@ fn list(plan: &Plan, light: Light) -> std::io::Result<()> {
             true => format!("{sweep}, fly"),
             false => sweep.to_string(),
         };
-        print::line(format_args!(
+        terminal::line(format_args!(
             "{name:<10} {readings:>5} readings {:>12}",
             clock(seconds)
         ))?;
     }
-    print::line(format_args!(
+    terminal::line(format_args!(
         "{:<10} {:>14} {:>12}",
         "warm-up",
         "",
         clock(plan.overhead_s)
     ))?;
-    print::line(format_args!(
+    terminal::line(format_args!(
         "{:<10} {:>5} readings {:>12}",
         "together",
         plan.steps.len(),
         clock(plan.seconds())
     ))?;
-    print::line(format_args!(
+    terminal::line(format_args!(
         "{:<10} {:>5} readings {:>12}",
         "its light",
         light.readings,
         clock(light.foreseen_s)
     ))?;
-    print::line(exposures(light))?;
+    terminal::line(exposures(light))?;
     for left_out in &plan.left_out {
         let saved = match left_out.seconds {
             0.0 => String::new(),
             seconds => format!(", {seconds:.1} s saved"),
         };
-        print::line(format_args!(
+        terminal::line(format_args!(
             "left out: {} ({} readings{saved}): {}",
             left_out.what, left_out.readings, left_out.why
         ))?;

@@ -1,7 +1,5 @@
 use serde_json::json;
 
-use crate::print;
-
 /// Lists the serial ports of this machine.
 ///
 /// # Errors
@@ -9,15 +7,15 @@ use crate::print;
 pub(crate) fn ports(as_json: bool) -> anyhow::Result<()> {
     let ports = rig::ports()?;
     if as_json {
-        return Ok(print::json(&json!(ports))?);
+        return Ok(terminal::json(&json!(ports))?);
     }
     if ports.is_empty() {
-        print::say("no serial port here");
+        terminal::say("no serial port here");
     }
     for port in ports {
         let usb = port.usb.as_ref();
         let product = usb.and_then(|usb| usb.product.as_deref()).unwrap_or_default();
-        print::line(format_args!("{}  {product}", port.path.display()))?;
+        terminal::line(format_args!("{}  {product}", port.path.display()))?;
     }
     Ok(())
 }

@@ -3,8 +3,6 @@ use std::time::{Duration, Instant};
 use capture::{Event, State};
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::print;
-
 /// Without a terminal, a line is printed at most so often.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 
@@ -37,7 +35,7 @@ impl Progress {
     pub(crate) fn show(&mut self, event: &Event) {
         match event {
             Event::State { state } => self.bar.set_prefix(word(*state)),
-            Event::Suspended { why } => self.bar.suspend(|| print::say(format_args!("holding: {why}"))),
+            Event::Suspended { why } => self.bar.suspend(|| terminal::say(format_args!("holding: {why}"))),
             Event::Step { sweep, .. } => self.bar.set_prefix(sweep.to_string()),
             Event::Progress {
                 done,
@@ -65,7 +63,7 @@ impl Progress {
         if self.bar.is_hidden() {
             if self.printed.elapsed() >= LINE_EVERY {
                 self.printed = Instant::now();
-                print::say(format_args!("{done} of {of} readings, {text}"));
+                terminal::say(format_args!("{done} of {of} readings, {text}"));
             }
             return;
         }

@@ -3,7 +3,6 @@ use std::path::Path;
 use api::{Action, Client, Job, JobId, JobState};
 
 use crate::error::CommandError;
-use crate::print;
 
 /// Adds a job file to the queue; prints the job's id.
 ///
@@ -12,10 +11,10 @@ use crate::print;
 pub(crate) fn submit(daemon: &Client, file: &Path, as_json: bool) -> anyhow::Result<()> {
     let job = hand_in(daemon, file)?;
     if as_json {
-        return Ok(print::json(&job)?);
+        return Ok(terminal::json(&job)?);
     }
-    print::say(format_args!("{}: {}{}", job.specimen, job.state, advice(&job)));
-    Ok(print::line(job.id)?)
+    terminal::say(format_args!("{}: {}{}", job.specimen, job.state, advice(&job)));
+    Ok(terminal::line(job.id)?)
 }
 
 /// Hands in a job file.
@@ -36,21 +35,21 @@ pub(crate) fn jobs(daemon: &Client, all: bool, as_json: bool) -> anyhow::Result<
     let mut jobs = daemon.jobs()?;
     jobs.retain(|job| all || !job.state.over());
     if as_json {
-        return Ok(print::json(&jobs)?);
+        return Ok(terminal::json(&jobs)?);
     }
     if jobs.is_empty() {
-        print::say("no job");
+        terminal::say("no job");
     }
     for job in &jobs {
         let state = job.state.to_string();
-        print::line(format_args!(
+        terminal::line(format_args!(
             "{}  {state:<17}  {}  {}",
             job.id, job.submitted, job.specimen
         ))?;
         let why = job.why.as_deref().unwrap_or_default();
         let more = format!("{why}{}", advice(job));
         if !more.is_empty() {
-            print::line(format_args!("{:<28}{}", "", more.trim_start_matches("; ")))?;
+            terminal::line(format_args!("{:<28}{}", "", more.trim_start_matches("; ")))?;
         }
     }
     Ok(())
@@ -77,9 +76,9 @@ pub(crate) fn resume(daemon: &Client, job: Option<JobId>, as_json: bool) -> anyh
     let paused = only(daemon, JobState::Paused)?;
     if paused.is_some() && (job.is_none() || job == paused) {
         daemon.act("/proceed")?;
-        print::say("going on");
+        terminal::say("going on");
         if as_json {
-            print::json(&daemon.rig()?)?;
+            terminal::json(&daemon.rig()?)?;
         }
         return Ok(());
     }
@@ -103,9 +102,9 @@ pub(crate) fn cancel(daemon: &Client, job: JobId, as_json: bool) -> anyhow::Resu
 fn act(daemon: &Client, id: JobId, action: Action, as_json: bool) -> anyhow::Result<()> {
     let job = daemon.act_on_job(id, action)?;
     if as_json {
-        return Ok(print::json(&job)?);
+        return Ok(terminal::json(&job)?);
     }
-    print::say(format_args!("{}: {}", job.specimen, job.state));
+    terminal::say(format_args!("{}: {}", job.specimen, job.state));
     Ok(())
 }
 

@@ -7,8 +7,6 @@ use report::RunDirectory;
 use serde_json::Value;
 use session::Status;
 
-use crate::print;
-
 /// Makes everything in a run directory again: from the daemon's store where that knows the run, else from the
 /// directory's own journal.
 ///
@@ -21,7 +19,7 @@ pub(crate) fn reconstruct(run: PathBuf, as_json: bool) -> anyhow::Result<ExitCod
         Some(Ok(Stored::Refused(code))) => return Ok(code),
         // The journal in the directory may be older than the store, and is all that can be read then.
         Some(Err(error)) if directory.journal().exists() => {
-            print::say(format_args!(
+            terminal::say(format_args!(
                 "{error:#}; the journal of the run directory is used"
             ));
             serde_json::to_value(report::reconstruct(&directory)?)?
@@ -30,12 +28,12 @@ pub(crate) fn reconstruct(run: PathBuf, as_json: bool) -> anyhow::Result<ExitCod
         None => serde_json::to_value(report::reconstruct(&directory)?)?,
     };
     if as_json {
-        print::json(&report)?;
+        terminal::json(&report)?;
         return Ok(ExitCode::SUCCESS);
     }
     for check in report["checks"].as_array().into_iter().flatten() {
         let text = |key: &str| check[key].as_str().unwrap_or_default();
-        print::line(format_args!("{}: {}", text("name"), text("text")))?;
+        terminal::line(format_args!("{}: {}", text("name"), text("text")))?;
     }
     Ok(ExitCode::SUCCESS)
 }

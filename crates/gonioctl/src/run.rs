@@ -9,9 +9,9 @@ use tokio::sync::watch;
 use crate::cli::DaemonArguments;
 use crate::closing::Closing;
 use crate::errand::Errand;
+use crate::exit;
 use crate::progress::Progress;
 use crate::signals::{STEPS, Signals};
-use crate::{exit, print};
 
 /// Where run directories are made unless told otherwise.
 const RUNS: &str = "runs";
@@ -46,10 +46,10 @@ pub(crate) fn run(task: &Task<'_>, daemon: &DaemonArguments, json: bool) -> anyh
     };
     let wall_s = begun.elapsed().as_secs_f64();
     if json {
-        print::json(&closing.summary(wall_s))?;
+        terminal::json(&closing.summary(wall_s))?;
     } else {
         closing.say(wall_s);
-        print::line(closing.directory.display())?;
+        terminal::line(closing.directory.display())?;
     }
     Ok(exit::code(closing.status))
 }
@@ -76,8 +76,8 @@ pub(crate) async fn obey(mut signals: Signals, sender: watch::Sender<Command>) {
         signals.next().await;
         // Nobody listens any more once the capture has ended.
         match sender.send(command) {
-            Ok(()) => print::say(word),
-            Err(_) => print::say("the capture has already ended; its results are being written"),
+            Ok(()) => terminal::say(word),
+            Err(_) => terminal::say("the capture has already ended; its results are being written"),
         }
     }
 }

@@ -3,9 +3,9 @@ use std::time::{Duration, Instant};
 use api::client::{Message, ServerSentEvent};
 use api::{FaultView, Job, Progress, RigView, What};
 use indicatif::{ProgressBar, ProgressStyle};
-use serde_json::json;
+use serde_json::{Value, json};
+use terminal::Printable;
 
-use crate::print;
 use crate::progress::clock;
 
 /// Without a terminal, progress is printed at most so often.
@@ -46,7 +46,10 @@ impl Screen {
             Message::Rig(rig) => self.rig(rig),
             _ if self.as_json => {
                 // A reader that went away ends us with the next event.
-                let _ = print::line(&event.data);
+                let _ = match serde_json::from_str::<Value>(&event.data) {
+                    Ok(data) => terminal::json_line(&data),
+                    Err(_) => terminal::line(&event.data),
+                };
             }
             Message::Event(event) => self.event(&event.what),
             Message::Unknown => tracing::debug!(event.data, "an event of a newer daemon"),
@@ -56,7 +59,7 @@ impl Screen {
     fn event(&mut self, what: &What) {
         match what {
             What::Progress { progress } => self.progress(progress),
-            What::Activity { activity } => self.bar.set_prefix(activity.to_string()),
+            What::Activity { activity } => self.bar.set_prefix(Printable(activity).to_string()),
             _ => {
                 if let Some(line) = line(what) {
                     self.say(&line);
@@ -68,7 +71,7 @@ impl Screen {
     /// Shows how a job stands.
     pub(crate) fn job(&mut self, job: &Job) {
         if self.as_json {
-            let _ = print::line(json!({ "event": "job", "job": job }));
+            let _ = terminal::json_line(&json!({ "event": "job", "job": job }));
             return;
         }
         self.say(&job_line(job));
@@ -78,7 +81,7 @@ impl Screen {
     pub(crate) fn say(&mut self, line: &str) {
         if self.said != line {
             line.clone_into(&mut self.said);
-            self.bar.suspend(|| print::say(line));
+            self.bar.suspend(|| terminal::say(line));
         }
     }
 
@@ -91,8 +94,8 @@ impl Screen {
         if self.as_json {
             return;
         }
-        self.bar.set_prefix(rig.activity.to_string());
-        self.bar.set_message(status(rig));
+        self.bar.set_prefix(Printable(rig.activity).to_string());
+        self.bar.set_message(Printable(status(rig)).to_string());
         if let Some(progress) = &rig.progress {
             self.progress(progress);
         }
@@ -113,7 +116,7 @@ impl Screen {
         if self.bar.is_hidden() && self.printed.is_none_or(|at| at.elapsed() >= LINE_EVERY) {
             self.printed = Some(Instant::now());
             let left = clock(seconds_left);
-            print::say(format_args!("{done} of {of} readings, {left} of rig time left"));
+            terminal::say(format_args!("{done} of {of} readings, {left} of rig time left"));
         }
     }
 }

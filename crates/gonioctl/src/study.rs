@@ -4,8 +4,6 @@ use std::sync::Mutex;
 use ::study::Study;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::print;
-
 /// Runs a study into a directory, which is printed; what was found goes to stderr.
 ///
 /// # Errors
@@ -25,12 +23,12 @@ pub(crate) fn study(file: Option<&Path>, quick: bool, out: Option<PathBuf>) -> a
         if bar.is_hidden() && tenth > *printed {
             *printed = tenth;
             let left = bar.eta().as_secs();
-            print::say(format_args!("{} %, {left} s left", 10 * tenth));
+            terminal::say(format_args!("{} %, {left} s left", 10 * tenth));
         }
     })?;
     bar.finish_and_clear();
-    print::say(found);
-    print::line(directory.display())?;
+    terminal::say(found);
+    terminal::line(directory.display())?;
     Ok(())
 }
 

@@ -1,9 +1,10 @@
 // The technician's page: shows what the daemon tells, and asks it for what the technician wants. It decides nothing.
 
-import { Plot } from "/assets/plot.js";
-import { Drawing } from "/assets/rig.js";
+import { Plot } from "./plot.js";
+import { Drawing } from "./rig.js";
 
-const API = "/api/v1";
+// Below wherever this page is: a proxy may have put it below a path of its own.
+const API = "api/v1";
 const LOGGED = 60;
 const $ = (id) => document.getElementById(id);
 
@@ -320,8 +321,17 @@ function signIn() {
   $("token").focus();
 }
 
+// A sign-in link carries its token behind #, where it is in no request. It must not stay in the address bar.
+async function followLink() {
+  const token = location.hash.match(/^#token=(.+)$/)?.[1];
+  if (!token) return;
+  history.replaceState(null, "", location.pathname + location.search);
+  await act("Sign in", "POST", "/session", { token });
+}
+
 async function start() {
   try {
+    await followLink();
     const session = await ask("GET", "/session");
     role = session.role ?? undefined;
     $("sign-out").hidden = !session.needs_token || !role;
@@ -396,7 +406,7 @@ $("job-file").addEventListener("change", async () => {
   if (file) $("job-text").value = await file.text();
 });
 $("submit").addEventListener("toggle", async () => {
-  if ($("submit").open && !$("job-text").value) $("job-text").value = await (await fetch("/assets/quickstart.toml")).text();
+  if ($("submit").open && !$("job-text").value) $("job-text").value = await (await fetch("assets/quickstart.toml")).text();
 });
 
 // A browser opens six connections to one place at most; pages that nobody looks at must not hold one, or an
@@ -404,5 +414,5 @@ $("submit").addEventListener("toggle", async () => {
 document.addEventListener("visibilitychange", () => {
   if (document.hidden) stream?.close(); else if (role) listen();
 });
-addEventListener("hashchange", route);
+addEventListener("hashchange", () => location.hash.startsWith("#token=") ? start() : route());
 start();

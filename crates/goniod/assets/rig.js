@@ -1,6 +1,6 @@
 // The rig to scale, in the plane of the arms: angles from the normal, positive to the right.
 
-import { element } from "/assets/plot.js";
+import { element } from "./plot.js";
 
 const ARM = 92, SCALE = 100;
 

@@ -3,8 +3,10 @@
 
 mod accept;
 mod access;
+mod address;
 mod body;
 mod connections;
+mod credential;
 mod events;
 mod job_file;
 mod jobs;
@@ -12,7 +14,10 @@ mod listener;
 mod metrics;
 mod openapi;
 mod page;
+mod peer;
+mod peer_groups;
 mod problem;
+mod refusals;
 mod rig;
 mod router;
 mod runs;
@@ -20,11 +25,14 @@ mod serve;
 mod session;
 mod shared;
 mod site;
+mod socket_file;
 mod tokens;
 mod watched;
 
 pub use access::Access;
-pub use listener::{Address, Listener};
+pub use address::Address;
+pub use listener::{ListenError, Listener};
 pub use openapi::openapi;
 pub use serve::{Limits, serve};
+pub use socket_file::UnixSocket;
 pub use tokens::{Role, TokenError, Tokens};

@@ -1,24 +1,25 @@
 use std::fs;
 use std::io::IsTerminal;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::SystemTime;
 
 use anyhow::Context;
-use clap::{CommandFactory, Parser, ValueEnum};
+use clap::{CommandFactory, Parser};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use sd_notify::NotifyState;
 use session::{SessionError, Status};
+use terminal::{LevelFilter, LogFormat};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 use tokio::task::JoinSet;
-use tracing_subscriber::EnvFilter;
 
 use crate::http::{self, Access, Address, Limits, Listener, Tokens};
 use crate::{Daemon, DaemonError, Settings};
 
-/// Where it is listened on when nothing else is said.
-const LISTEN: &str = "127.0.0.1:4664";
+/// Where TCP is listened on when nothing else is said.
+const LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 4664);
 /// Threads that answer requests; the rig has one of its own.
 const THREADS: usize = 2;
 
@@ -29,14 +30,16 @@ struct Arguments {
     /// Rig file [default: config/rig.toml where there is one, else the built-in simulator]
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Where to listen: IP:PORT (port 0 takes a free one) or unix:PATH; can be given several times
-    #[arg(long, value_name = "ADDR", default_value = LISTEN)]
+    /// Where to listen: IP:PORT (port 0 takes a free one), unix:PATH, or unix for the usual socket; can be given several
+    /// times, and what is not named is off [default: 127.0.0.1:4664 and unix, which is $XDG_RUNTIME_DIR/goniod.sock, as
+    /// a service /run/goniod/goniod.sock]
+    #[arg(long, value_name = "ADDR")]
     listen: Vec<Address>,
     /// Folder of the store and of the run directories
     #[arg(long, value_name = "DIR", default_value = "runs")]
     data: PathBuf,
-    /// Token file, made where there is none; needed by whoever comes from outside, and, where it is given, by everyone
-    /// [default: tokens.toml in the data folder, for addresses that other computers reach]
+    /// File with the tokens that everybody needs who comes over TCP, made where there is none [default: tokens.toml in
+    /// the data folder]
     #[arg(long, value_name = "FILE")]
     tokens: Option<PathBuf>,
     /// Host name under which a browser asks for this daemon, besides localhost and its address; can be given several
@@ -49,15 +52,7 @@ struct Arguments {
     reconstruct: Option<PathBuf>,
     /// How the log on stderr is written; RUST_LOG says how much
     #[arg(long, value_enum, default_value = "human")]
-    log: Log,
-}
-
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Log {
-    /// For people.
-    Human,
-    /// A JSON object a line.
-    Json,
+    log: LogFormat,
 }
 
 /// The daemon's command line, of which its manual page is made.
@@ -69,16 +64,11 @@ pub fn command() -> clap::Command {
 ///
 /// The addresses that it listens on are printed to stdout, one a line, once it answers.
 pub fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
-    let log = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_ansi(std::io::stderr().is_terminal())
-        .with_writer(std::io::stderr);
-    match arguments.log {
-        Log::Human => log.init(),
-        Log::Json => log.json().init(),
-    }
+    let arguments: Arguments = match terminal::arguments() {
+        Ok(arguments) => arguments,
+        Err(code) => return code,
+    };
+    terminal::log(arguments.log, LevelFilter::INFO);
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(THREADS)
         .enable_all()
@@ -137,19 +127,17 @@ async fn serve(
     ended: impl Future<Output = &'static str>,
 ) -> anyhow::Result<()> {
     let limits = Limits::default();
+    let tokens = tokens(arguments)?;
     let (close, closing) = watch::channel(());
     let mut servers = JoinSet::new();
-    for address in &arguments.listen {
-        let listener = Listener::bind(address)
-            .await
-            .with_context(|| format!("--listen: cannot listen on {address}"))?;
+    for address in addresses(arguments) {
+        let listener = Listener::bind(&address).await?;
         let address = listener.address()?;
         let tcp = match &address {
             Address::Tcp(address) => Some(*address),
             Address::Unix(_) => None,
         };
-        let tokens = tokens(arguments, &address)?;
-        let access = Access::new(tcp, arguments.known_as.clone(), tokens, &limits);
+        let access = Access::new(tcp, arguments.known_as.clone(), Some(tokens.clone()), &limits);
         let mut closing = closing.clone();
         let closed = async move {
             // An error means the same: nobody is left who could close it.
@@ -157,7 +145,10 @@ async fn serve(
         };
         servers.spawn(http::serve(listener, access, limits, daemon.clone(), closed));
         tracing::info!("listening on {address}");
-        println!("{address}");
+        terminal::line(&address)?;
+        if let Some(address) = tcp {
+            offer_sign_in(address, &tokens);
+        }
     }
     notify(&[NotifyState::Ready]);
     let signal = tokio::select! {
@@ -170,12 +161,6 @@ async fn serve(
     daemon.shutdown().await;
     drop(close);
     while servers.join_next().await.is_some() {}
-    for address in &arguments.listen {
-        if let Address::Unix(path) = address {
-            // Whoever starts next would replace it.
-            let _ = fs::remove_file(path);
-        }
-    }
     Ok(())
 }
 
@@ -192,16 +177,54 @@ fn open_files() {
     }
 }
 
-/// The tokens that are needed at an address.
-fn tokens(arguments: &Arguments, address: &Address) -> anyhow::Result<Option<Tokens>> {
-    let default = arguments.data.join("tokens.toml");
-    let path = match &arguments.tokens {
-        Some(path) => path,
-        None if address.is_local() => return Ok(None),
-        None => &default,
+/// Where to listen: where the arguments say, else over TCP on this computer and on the usual socket.
+fn addresses(arguments: &Arguments) -> Vec<Address> {
+    if !arguments.listen.is_empty() {
+        return arguments.listen.clone();
+    }
+    [Some(Address::Tcp(LISTEN)), usual_socket()]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+/// The usual socket, whose folder is made where it is missing and may be made.
+fn usual_socket() -> Option<Address> {
+    let address = Address::usual_socket();
+    let Some(Address::Unix(path)) = &address else {
+        tracing::warn!("no Unix socket: $XDG_RUNTIME_DIR is not set; --listen unix:PATH makes one elsewhere");
+        return None;
     };
-    tracing::info!("{address} needs a token of {}", path.display());
-    Ok(Some(Tokens::open(path)?))
+    let folder = path.parent().unwrap_or(path);
+    if let Err(error) = fs::create_dir_all(folder) {
+        let folder = folder.display();
+        tracing::warn!(
+            "no Unix socket: cannot make {folder} ({error}); --listen unix:PATH makes one elsewhere"
+        );
+        return None;
+    }
+    address
+}
+
+/// The tokens that everybody needs who comes over TCP.
+fn tokens(arguments: &Arguments) -> anyhow::Result<Tokens> {
+    let default = arguments.data.join("tokens.toml");
+    let path = arguments.tokens.as_deref().unwrap_or(&default);
+    let tokens = Tokens::open(path)?;
+    tracing::info!("over TCP, a token of {} is needed", path.display());
+    Ok(tokens)
+}
+
+/// Says how a browser signs in: to somebody who looks, and not to a log, which others may read.
+fn offer_sign_in(mut address: SocketAddr, tokens: &Tokens) {
+    if !std::io::stderr().is_terminal() {
+        return;
+    }
+    if address.ip().is_unspecified() {
+        address.set_ip(Ipv4Addr::LOCALHOST.into());
+    }
+    let link = tokens.sign_in_link(&Address::Tcp(address).to_string());
+    terminal::say(format_args!("to sign in with a browser, open {link}"));
 }
 
 /// Returns which signal asked the daemon to end.

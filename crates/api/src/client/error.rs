@@ -8,7 +8,7 @@ use ureq::http::StatusCode;
 #[non_exhaustive]
 pub enum ClientError {
     /// An address is neither of a computer and a port nor of a socket file.
-    #[error("{address:?} is no address of a daemon, allowed: http://HOST:PORT, unix:PATH")]
+    #[error("{address:?} is no address of a daemon, allowed: unix:PATH, http://HOST:PORT, https://HOST/PATH")]
     Address {
         /// The address as given.
         address: String,
@@ -21,6 +21,14 @@ pub enum ClientError {
         /// Why.
         source: std::io::Error,
     },
+    /// A file of certificates cannot be read, or holds none.
+    #[error("--ca: cannot read the certificates in {}", .path.display())]
+    Authorities {
+        /// Which.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
     /// A token file holds no token.
     #[error("token file {} holds no token: allowed are one token alone, or the daemon's tokens.toml", .path.display())]
     NoToken {
@@ -28,12 +36,12 @@ pub enum ClientError {
         path: PathBuf,
     },
     /// It does not answer.
-    #[error(
-        "cannot reach the daemon at {address}; is it running (`systemctl status goniod`), and is the address right (--daemon)?"
-    )]
+    #[error("cannot reach the daemon at {address}{remedy}")]
     Unreachable {
         /// Where it was looked for.
         address: String,
+        /// What can be done, from a semicolon on.
+        remedy: String,
         /// Why not.
         source: Box<ureq::Error>,
     },
@@ -78,6 +86,11 @@ impl Refused {
         self.status == StatusCode::UNPROCESSABLE_ENTITY
     }
 
+    /// Whether a token is needed, and none that is known was given.
+    pub fn unauthorized(&self) -> bool {
+        self.status == StatusCode::UNAUTHORIZED
+    }
+
     /// Whether there is no such thing.
     pub fn not_found(&self) -> bool {
         self.status == StatusCode::NOT_FOUND
@@ -87,7 +100,9 @@ impl Refused {
 impl std::fmt::Display for Refused {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let hint = match self.status {
-            StatusCode::UNAUTHORIZED => " (give it with --token-file)",
+            StatusCode::UNAUTHORIZED => {
+                " (give it with --token-file; the daemon keeps it in tokens.toml of its data folder)"
+            }
             _ => "",
         };
         write!(f, "the daemon refuses: {}{hint}", self.detail)

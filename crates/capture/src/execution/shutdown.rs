@@ -168,7 +168,7 @@ async fn emergency_stop(control: &mut watch::Receiver<Command>) {
         .is_ok();
     if !pressed {
         // Nobody is left who could ask.
-        std::future::pending().await
+        std::future::pending::<()>().await;
     }
 }
 

@@ -3,9 +3,10 @@ use std::time::Duration;
 
 use socket2::SockRef;
 use tokio::io::{AsyncRead, AsyncWrite};
-use tokio::net::{TcpListener, TcpStream, UnixListener, UnixStream};
+use tokio::net::{TcpListener, TcpStream, UnixStream};
 
-use super::serve::Peer;
+use super::peer::Peer;
+use super::socket_file::UnixSocket;
 
 /// Bytes that the system keeps of an answer that a client has not read yet, so that one that reads nothing is noticed
 /// and costs little.
@@ -34,17 +35,17 @@ impl Accept for TcpListener {
         noted(socket.set_tcp_nodelay(true));
         noted(socket.set_tcp_user_timeout(Some(unacknowledged)));
         noted(socket.set_send_buffer_size(SEND_BUFFER));
-        Ok((stream, Peer(Some(address))))
+        Ok((stream, Peer::Tcp(address)))
     }
 }
 
-impl Accept for UnixListener {
+impl Accept for UnixSocket {
     type Socket = UnixStream;
 
     async fn accept(&self, _: Duration) -> io::Result<(UnixStream, Peer)> {
-        let (stream, _) = UnixListener::accept(self).await?;
+        let (stream, peer) = UnixSocket::accept(self).await?;
         noted(SockRef::from(&stream).set_send_buffer_size(SEND_BUFFER));
-        Ok((stream, Peer(None)))
+        Ok((stream, peer))
     }
 }
 

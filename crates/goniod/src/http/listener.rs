@@ -1,56 +1,56 @@
-use std::fs::Permissions;
 use std::io;
 use std::net::SocketAddr;
-use std::os::unix::fs::PermissionsExt;
-use std::os::unix::net::UnixStream;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
 
-use tokio::net::{TcpListener, UnixListener};
+use tokio::net::TcpListener;
 
-/// What a socket file begins with.
-const UNIX: &str = "unix:";
-/// Owner and group may connect.
-const SOCKET_MODE: u32 = 0o660;
+use super::address::Address;
+use super::socket_file::UnixSocket;
 
-/// Where to listen.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Address {
-    /// An IP address and a port; port 0 takes a free one.
-    Tcp(SocketAddr),
-    /// A socket file.
-    Unix(PathBuf),
-}
-
-impl FromStr for Address {
-    type Err = String;
-    fn from_str(text: &str) -> Result<Self, String> {
-        if let Some(path) = text.strip_prefix(UNIX) {
-            return Ok(Self::Unix(path.into()));
-        }
-        text.parse().map(Self::Tcp).map_err(|_| {
-            format!("{text:?} is no address; allowed are IP:PORT, such as 127.0.0.1:4664 or [::1]:0, and unix:PATH")
-        })
-    }
-}
-
-impl std::fmt::Display for Address {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Tcp(address) => write!(f, "http://{address}"),
-            Self::Unix(path) => write!(f, "{UNIX}{}", path.display()),
-        }
-    }
-}
-
-impl Address {
-    /// Whether only this computer reaches it.
-    pub fn is_local(&self) -> bool {
-        match self {
-            Self::Tcp(address) => address.ip().is_loopback(),
-            Self::Unix(_) => true,
-        }
-    }
+/// Why an address cannot be listened on.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ListenError {
+    /// The system refuses a TCP address.
+    #[error(
+        "cannot listen on http://{address}; is another goniod running, or is the address not of this computer? name another one with --listen"
+    )]
+    Tcp {
+        /// Which address.
+        address: SocketAddr,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Something else than a socket has the path of the socket. It is left as it is.
+    #[error("cannot listen on unix:{}: there is {what}, which is left as it is; name another path with --listen", .path.display())]
+    Taken {
+        /// Which path.
+        path: PathBuf,
+        /// What there is.
+        what: &'static str,
+    },
+    /// A program listens on the socket, or might.
+    #[error("cannot listen on unix:{}: another program has this socket; end it, or name another path with --listen", .path.display())]
+    InUse {
+        /// Which path.
+        path: PathBuf,
+    },
+    /// There is no folder for the socket.
+    #[error("cannot listen on unix:{}: there is no folder {}; make it, or name another path with --listen", .path.display(), .folder.display())]
+    NoFolder {
+        /// Which path.
+        path: PathBuf,
+        /// The folder that is missing.
+        folder: PathBuf,
+    },
+    /// The system refuses the socket.
+    #[error("cannot listen on unix:{}", .path.display())]
+    Unix {
+        /// Which path.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
 }
 
 /// A socket that is listened on.
@@ -59,18 +59,21 @@ pub enum Listener {
     /// TCP.
     Tcp(TcpListener),
     /// A Unix socket.
-    Unix(UnixListener),
+    Unix(UnixSocket),
 }
 
 impl Listener {
-    /// Listens. A socket file that nobody listens on any more is replaced.
+    /// Listens. A socket file that nobody listens on any more is replaced; nothing else is ever removed.
     ///
     /// # Errors
-    /// An address that is in use, or not to be had.
-    pub async fn bind(address: &Address) -> io::Result<Self> {
+    /// An address that is in use, or not to be had; a path that something else has, or whose folder is missing.
+    pub async fn bind(address: &Address) -> Result<Self, ListenError> {
         match address {
-            Address::Tcp(address) => Ok(Self::Tcp(TcpListener::bind(address).await?)),
-            Address::Unix(path) => Ok(Self::Unix(unix(path)?)),
+            &Address::Tcp(address) => match TcpListener::bind(address).await {
+                Ok(listener) => Ok(Self::Tcp(listener)),
+                Err(source) => Err(ListenError::Tcp { address, source }),
+            },
+            Address::Unix(path) => UnixSocket::bind(path).await.map(Self::Unix),
         }
     }
 
@@ -81,23 +84,7 @@ impl Listener {
     pub fn address(&self) -> io::Result<Address> {
         match self {
             Self::Tcp(listener) => listener.local_addr().map(Address::Tcp),
-            Self::Unix(listener) => {
-                let address = listener.local_addr()?;
-                Ok(Address::Unix(
-                    address.as_pathname().unwrap_or(Path::new("")).to_owned(),
-                ))
-            }
+            Self::Unix(socket) => Ok(Address::Unix(Path::to_owned(socket.path()))),
         }
     }
-}
-
-fn unix(path: &Path) -> io::Result<UnixListener> {
-    let stale =
-        || UnixStream::connect(path).is_err_and(|error| error.kind() == io::ErrorKind::ConnectionRefused);
-    if path.exists() && stale() {
-        std::fs::remove_file(path)?;
-    }
-    let listener = UnixListener::bind(path)?;
-    std::fs::set_permissions(path, Permissions::from_mode(SOCKET_MODE))?;
-    Ok(listener)
 }

@@ -8,7 +8,7 @@ use utoipa_axum::router::OpenApiRouter;
 
 use super::problem::{MEDIA_TYPE, Problem};
 use super::shared::Shared;
-use super::{access, events, jobs, rig, runs, session};
+use super::{credential, events, jobs, rig, runs, session};
 use crate::{Action, Event};
 
 /// Path of the API; its version changes with what a client could notice.
@@ -76,7 +76,7 @@ fn complete(document: &mut utoipa::openapi::OpenApi) {
     );
     components.add_security_scheme(
         "cookie",
-        SecurityScheme::ApiKey(ApiKey::Cookie(ApiKeyValue::new(access::COOKIE))),
+        SecurityScheme::ApiKey(ApiKey::Cookie(ApiKeyValue::new(credential::COOKIE))),
     );
     // Where the daemon has no tokens, none is needed.
     document.security = Some(vec![

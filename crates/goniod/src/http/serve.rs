@@ -1,4 +1,3 @@
-use std::fmt;
 use std::io;
 use std::num::NonZeroU32;
 use std::pin::pin;
@@ -21,6 +20,7 @@ use super::access::{self, Access};
 use super::connections::{Connection, Connections, Slot};
 use super::listener::Listener;
 use super::metrics::Metrics;
+use super::peer::Peer;
 use super::router::router;
 use super::shared::{Parts, Shared, WORKING};
 use super::watched::{Answer, Asked, Watched};
@@ -73,19 +73,6 @@ impl Default for Limits {
     }
 }
 
-/// Who is at the other end of a connection.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Peer(pub(super) Option<std::net::SocketAddr>);
-
-impl fmt::Display for Peer {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self.0 {
-            Some(address) => address.ip().fmt(f),
-            None => f.write_str("local socket"),
-        }
-    }
-}
-
 /// Answers requests until `shutdown`, then ends all streams and finishes what is being answered.
 ///
 /// # Errors
@@ -114,7 +101,7 @@ pub async fn serve(
     };
     match listener {
         Listener::Tcp(listener) => server.accept(listener, shutdown).await,
-        Listener::Unix(listener) => server.accept(listener, shutdown).await,
+        Listener::Unix(socket) => server.accept(socket, shutdown).await,
     }
     Ok(())
 }
@@ -182,8 +169,7 @@ impl Server {
     {
         let socket = Watched::new(socket, Arc::clone(&slot.connection), self.limits.idle);
         let (app, connection) = (self.app.clone(), Arc::clone(&slot.connection));
-        let service =
-            service_fn(move |request| answer(app.clone(), Arc::clone(&connection), peer.clone(), request));
+        let service = service_fn(move |request| answer(app.clone(), Arc::clone(&connection), peer, request));
         let served = self
             .graceful
             .watch(self.http.serve_connection(TokioIo::new(socket), service));

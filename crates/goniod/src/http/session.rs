@@ -1,14 +1,15 @@
 use axum::Json;
 use axum::body::Bytes;
-use axum::extract::State;
+use axum::extract::{Extension, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{AppendHeaders, IntoResponse};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
-use super::access::{COOKIE, Credential};
 use super::body;
+use super::credential::COOKIE;
+use super::peer::Peer;
 use super::problem::Problem;
 use super::shared::Shared;
 use super::tokens::Role;
@@ -36,10 +37,14 @@ pub(crate) fn routes() -> OpenApiRouter<Shared> {
 
 /// Tell what the one who asks may do.
 #[utoipa::path(get, path = "/session", tag = "access", responses((status = 200, body = Session)))]
-async fn session(State(shared): State<Shared>, headers: HeaderMap) -> Json<Session> {
+async fn session(
+    State(shared): State<Shared>,
+    Extension(peer): Extension<Peer>,
+    headers: HeaderMap,
+) -> Json<Session> {
     Json(Session {
-        needs_token: shared.access.needs_token(),
-        role: shared.access.role(Credential::of(&headers).token()),
+        needs_token: shared.access.role(peer, &HeaderMap::new()).is_none(),
+        role: shared.access.role(peer, &headers),
     })
 }
 
@@ -48,20 +53,31 @@ async fn session(State(shared): State<Shared>, headers: HeaderMap) -> Json<Sessi
     responses((status = 204, description = "Signed in")))]
 async fn sign_in(
     State(shared): State<Shared>,
+    Extension(peer): Extension<Peer>,
     headers: HeaderMap,
     text: Bytes,
 ) -> Result<impl IntoResponse, Problem> {
     let SignIn { token } = body::json(&headers, &text)?;
-    if shared.access.role(Some(&token)).is_none() {
+    let Some(role) = shared.access.role_of_token(&token) else {
         shared.metrics.refused("token");
+        shared.access.refusals.log(|unlogged| {
+            tracing::warn!(%peer, unlogged, "sign-in refused: the token is none of the daemon's token file");
+        });
         return Err(Problem::new(
             StatusCode::UNAUTHORIZED,
             "this is no token of the daemon's token file",
         ));
-    }
-    // Where no tokens are needed there is nothing to keep, and what was sent may be anything.
-    let kept = if shared.access.needs_token() { &token } else { "" };
-    Ok((StatusCode::NO_CONTENT, cookie(kept, "")))
+    };
+    tracing::info!(%peer, ?role, "signed in");
+    // Over TLS, which a proxy speaks, a browser is to send it over TLS alone.
+    let origin = headers
+        .get(header::ORIGIN)
+        .and_then(|origin| origin.to_str().ok());
+    let secure = origin.is_some_and(|origin| origin.starts_with("https://"));
+    Ok((
+        StatusCode::NO_CONTENT,
+        cookie(&token, if secure { "; Secure" } else { "" }),
+    ))
 }
 
 /// Sign out: forget the token.
@@ -70,7 +86,9 @@ async fn sign_out() -> impl IntoResponse {
     (StatusCode::NO_CONTENT, cookie("", "; Max-Age=0"))
 }
 
-fn cookie(token: &str, age: &str) -> AppendHeaders<[(header::HeaderName, String); 1]> {
-    let value = format!("{COOKIE}={token}; Path=/; HttpOnly; SameSite=Strict{age}");
+/// Without a path of its own the cookie belongs to the API alone, wherever a proxy puts that (RFC 6265, 5.1.4): others
+/// on the same host do not get it, and two daemons below one host do not get each other's.
+fn cookie(token: &str, more: &str) -> AppendHeaders<[(header::HeaderName, String); 1]> {
+    let value = format!("{COOKIE}={token}; HttpOnly; SameSite=Strict{more}");
     AppendHeaders([(header::SET_COOKIE, value)])
 }

@@ -34,7 +34,7 @@ pub enum TokenError {
         source: io::Error,
     },
     /// Others than its owner may read or write it.
-    #[error("token file {} has mode {mode:03o}, allowed is 600", .path.display())]
+    #[error("token file {path} has mode {mode:03o}, allowed is 600: `chmod 600 {path}`, and new tokens where others may have read it (remove the file)", path = .path.display())]
     Open {
         /// Where.
         path: PathBuf,
@@ -52,7 +52,7 @@ pub enum TokenError {
 }
 
 /// The bearer tokens of a token file, one for each role.
-#[derive(Deserialize)]
+#[derive(Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tokens {
     watch: String,
@@ -81,6 +81,12 @@ impl Tokens {
             return Some(Role::Operate);
         }
         bool::from(watch).then_some(Role::Watch)
+    }
+
+    /// Returns a link that signs a browser in at an address as one who may operate. What stands behind `#` stays in the
+    /// browser: it is in no request, so in no log and no proxy either.
+    pub fn sign_in_link(&self, address: &str) -> String {
+        format!("{address}/#token={}", self.operate)
     }
 
     fn read(mut file: File, path: &Path) -> Result<Self, TokenError> {

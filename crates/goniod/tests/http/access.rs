@@ -1,7 +1,5 @@
 //! Who may use the daemon, and from where.
 
-use goniod::http::Limits;
-
 use crate::service::Service;
 
 const VERBS: [&str; 6] = ["estop", "stop", "pause", "proceed", "acknowledge", "park"];
@@ -10,7 +8,8 @@ const VERBS: [&str; 6] = ["estop", "stop", "pause", "proceed", "acknowledge", "p
 async fn strangers_are_refused_and_change_nothing() {
     let service = Service::start().await;
     let host = service.address;
-    let ours = format!("Host: {host}\r\n");
+    // Each has a good token, as a browser would send it: that alone lets nobody in.
+    let ours = format!("Host: {host}\r\n{}", service.bearer("operate"));
     for (what, head) in [
         ("no host", "POST /api/v1/estop HTTP/1.1\r\n".to_owned()),
         (
@@ -88,9 +87,12 @@ async fn nothing_changes_by_getting() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_token_is_needed_and_says_what_its_bearer_may_do() {
-    let service = Service::with(Limits::default(), true).await;
+    let service = Service::start().await;
     let (watch, operate) = (service.token("watch"), service.token("operate"));
     let bearer = |token: &str| format!("Authorization: Bearer {token}\r\n");
+    let ask = async |method: &str, path: &str, headers: &str| {
+        service.ask_as_stranger(method, path, headers, "").await
+    };
     for wrong in [
         String::new(),
         bearer("x"),
@@ -105,7 +107,7 @@ async fn a_token_is_needed_and_says_what_its_bearer_may_do() {
             ("POST", "/api/v1/estop"),
             ("GET", "/nowhere"),
         ] {
-            let answer = service.ask(method, path, &wrong, "").await;
+            let answer = ask(method, path, &wrong).await;
             assert!(answer.problem(401).contains("token"), "{method} {path}");
             assert!(
                 answer
@@ -115,35 +117,27 @@ async fn a_token_is_needed_and_says_what_its_bearer_may_do() {
         }
     }
     // The page has nothing to hide, and must be there to sign in with.
-    assert_eq!(service.get("/").await.status, 200);
-    assert_eq!(service.get("/health").await.status, 200);
+    assert_eq!(ask("GET", "/", "").await.status, 200);
+    assert_eq!(ask("GET", "/health", "").await.status, 200);
     let watcher = bearer(&watch);
-    assert_eq!(service.ask("GET", "/api/v1/rig", &watcher, "").await.status, 200);
+    assert_eq!(ask("GET", "/api/v1/rig", &watcher).await.status, 200);
     for verb in VERBS {
-        let answer = service
-            .ask("POST", &format!("/api/v1/{verb}"), &watcher, "")
-            .await;
+        let answer = ask("POST", &format!("/api/v1/{verb}"), &watcher).await;
         assert!(answer.problem(403).contains("may watch"), "{verb}");
     }
-    assert_eq!(
-        service
-            .ask("POST", "/api/v1/estop", &bearer(&operate), "")
-            .await
-            .status,
-        204
-    );
+    assert_eq!(ask("POST", "/api/v1/estop", &bearer(&operate)).await.status, 204);
     service.end().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn signing_in_keeps_the_token_in_a_cookie_that_only_our_page_can_use() {
-    let service = Service::with(Limits::default(), true).await;
+    let service = Service::start().await;
     let json = "Content-Type: application/json\r\n";
     let sign_in = |token: String| {
         let service = &service;
         async move {
             service
-                .ask(
+                .ask_as_stranger(
                     "POST",
                     "/api/v1/session",
                     json,
@@ -160,19 +154,34 @@ async fn signing_in_keeps_the_token_in_a_cookie_that_only_our_page_can_use() {
         cookie.contains("HttpOnly") && cookie.contains("SameSite=Strict"),
         "{cookie}"
     );
+    assert!(
+        !cookie.contains("Path"),
+        "it is for the API alone, wherever that is: {cookie}"
+    );
     let cookie = format!("Cookie: other=1; {}\r\n", cookie.split(';').next().unwrap());
-    let session = service.ask("GET", "/api/v1/session", &cookie, "").await.json();
+    let session = service
+        .ask_as_stranger("GET", "/api/v1/session", &cookie, "")
+        .await
+        .json();
     assert_eq!(session["role"], "operate");
     assert!(
         service
-            .ask("POST", "/api/v1/estop", &cookie, "")
+            .ask_as_stranger("POST", "/api/v1/estop", &cookie, "")
             .await
             .problem(403)
             .contains("Origin")
     );
     let ours = format!("{cookie}Origin: http://{}\r\n", service.address);
-    assert_eq!(service.ask("POST", "/api/v1/estop", &ours, "").await.status, 204);
-    let out = service.ask("DELETE", "/api/v1/session", &ours, "").await;
+    assert_eq!(
+        service
+            .ask_as_stranger("POST", "/api/v1/estop", &ours, "")
+            .await
+            .status,
+        204
+    );
+    let out = service
+        .ask_as_stranger("DELETE", "/api/v1/session", &ours, "")
+        .await;
     assert!(out.header("set-cookie").unwrap().contains("Max-Age=0"));
     service.end().await;
 }

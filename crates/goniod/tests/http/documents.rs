@@ -143,10 +143,8 @@ async fn the_page_may_use_this_daemon_alone() {
         "{policy}"
     );
     let text = String::from_utf8(page.body).unwrap();
-    for reference in text
-        .split(['"', '\''])
-        .filter(|part| part.starts_with("/assets/"))
-    {
+    for reference in text.split(['"', '\'']).filter(|part| part.starts_with("assets/")) {
+        let reference = &format!("/{reference}");
         let asset = service.get(reference).await;
         assert_eq!(asset.status, 200, "{reference}");
         assert_eq!(asset.header("x-content-type-options"), Some("nosniff"));

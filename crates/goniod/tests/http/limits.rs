@@ -17,15 +17,17 @@ async fn a_body_that_is_too_large_is_refused_before_it_is_read() {
         "/api/v1/acknowledge",
     ] {
         let head = format!(
-            "POST {path} HTTP/1.1\r\nHost: {}\r\nContent-Type: application/toml\r\nContent-Length: 104857600\r\n",
-            service.address
+            "POST {path} HTTP/1.1\r\nHost: {}\r\n{}Content-Type: application/toml\r\nContent-Length: 104857600\r\n",
+            service.address,
+            service.bearer("operate")
         );
         service.raw(&head, b"").await.problem(413);
     }
     // One that does not say how long it is, is cut off where it becomes too long.
     let head = format!(
-        "POST /api/v1/jobs HTTP/1.1\r\nHost: {}\r\nContent-Type: application/toml\r\nTransfer-Encoding: chunked\r\n",
-        service.address
+        "POST /api/v1/jobs HTTP/1.1\r\nHost: {}\r\n{}Content-Type: application/toml\r\nTransfer-Encoding: chunked\r\n",
+        service.address,
+        service.bearer("operate")
     );
     let chunk = format!("40000\r\n{}\r\n", "#".repeat(0x40000));
     service
@@ -41,7 +43,7 @@ async fn stopping_is_never_held_up_by_the_request_rate() {
         requests_per_s: NonZeroU32::MIN,
         ..Limits::default()
     };
-    let service = Service::with(limits, false).await;
+    let service = Service::with(limits).await;
     let mut held_up = 0;
     for _ in 0..3 {
         let answer = service.get("/api/v1/rig").await;
@@ -64,7 +66,7 @@ async fn only_so_many_streams_are_open_and_a_closed_one_makes_room() {
         streams: 2,
         ..Limits::default()
     };
-    let service = Service::with(limits, false).await;
+    let service = Service::with(limits).await;
     let first = service.watch("").await;
     let second = service.watch("").await;
     assert_eq!((first.status, second.status), (200, 200));

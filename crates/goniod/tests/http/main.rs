@@ -7,6 +7,7 @@ mod access;
 mod documents;
 mod limits;
 mod manual;
+mod relay;
 mod service;
 mod slots;
 mod unix;

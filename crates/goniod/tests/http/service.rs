@@ -32,11 +32,11 @@ pub(crate) struct Answer {
 
 impl Service {
     pub(crate) async fn start() -> Self {
-        Self::with(Limits::default(), false).await
+        Self::with(Limits::default()).await
     }
 
-    /// With tokens, a file tokens.toml is made in the data folder.
-    pub(crate) async fn with(limits: Limits, tokens: bool) -> Self {
+    /// Its tokens are in the file tokens.toml of the data folder.
+    pub(crate) async fn with(limits: Limits) -> Self {
         let data = tempfile::tempdir().unwrap();
         let daemon = Daemon::open(Settings {
             rig: "[sim]\nimperfections = \"none\"\n".to_owned(),
@@ -50,8 +50,8 @@ impl Service {
         let Address::Tcp(address) = listener.address().unwrap() else {
             panic!("TCP was asked for");
         };
-        let tokens = tokens.then(|| Tokens::open(&data.path().join("tokens.toml")).unwrap());
-        let access = Access::new(Some(address), [], tokens, &limits);
+        let tokens = Tokens::open(&data.path().join("tokens.toml")).unwrap();
+        let access = Access::new(Some(address), [], Some(tokens), &limits);
         let (close, closed) = oneshot::channel();
         let server = tokio::spawn(serve(listener, access, limits, daemon.clone(), async {
             let _ = closed.await;
@@ -72,6 +72,11 @@ impl Service {
             .as_str()
             .unwrap()
             .to_owned()
+    }
+
+    /// The header by which the bearer of a token says who it is.
+    pub(crate) fn bearer(&self, role: &str) -> String {
+        format!("Authorization: Bearer {}\r\n", self.token(role))
     }
 
     /// Sends a request as it stands, but for the end of its head, and reads the answer.
@@ -97,8 +102,20 @@ impl Service {
         }
     }
 
-    /// Sends a request with headers, each ending in a line break, and a body.
+    /// Sends an operator's request with headers, each ending in a line break, and a body.
     pub(crate) async fn ask(&self, method: &str, path: &str, headers: &str, body: &str) -> Answer {
+        let headers = format!("{}{headers}", self.bearer("operate"));
+        self.ask_as_stranger(method, path, &headers, body).await
+    }
+
+    /// Sends a request that says who it is by these headers alone.
+    pub(crate) async fn ask_as_stranger(
+        &self,
+        method: &str,
+        path: &str,
+        headers: &str,
+        body: &str,
+    ) -> Answer {
         let (host, length) = (self.address, body.len());
         let head =
             format!("{method} {path} HTTP/1.1\r\nHost: {host}\r\nContent-Length: {length}\r\n{headers}");
@@ -131,8 +148,9 @@ impl Service {
     pub(crate) async fn watch(&self, headers: &str) -> Watch {
         let mut stream = TcpStream::connect(self.address).await.unwrap();
         let head = format!(
-            "GET /api/v1/events HTTP/1.1\r\nHost: {}\r\n{headers}\r\n",
-            self.address
+            "GET /api/v1/events HTTP/1.1\r\nHost: {}\r\n{}{headers}\r\n",
+            self.address,
+            self.bearer("operate")
         );
         stream.write_all(head.as_bytes()).await.unwrap();
         let mut lines = BufReader::new(stream).lines();

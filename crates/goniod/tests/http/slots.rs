@@ -89,7 +89,7 @@ async fn estop(mut stream: impl AsyncRead + AsyncWrite + Unpin, token: &str) -> 
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_stop_is_answered_while_useless_connections_take_all_slots() {
-    let service = Service::with(FEW, true).await;
+    let service = Service::with(FEW).await;
     let token = service.token("operate");
     let connect = async || TcpStream::connect(service.address).await.unwrap();
     for nuisance in NUISANCES {
@@ -167,7 +167,7 @@ async fn a_stop_is_answered_while_520_sockets_have_asked_for_the_page_and_never_
         },
     )
     .unwrap();
-    let service = Service::with(Limits::DEFAULT, true).await;
+    let service = Service::with(Limits::DEFAULT).await;
     let token = service.token("operate");
     let mut open = Vec::new();
     for _ in 0..520 {
@@ -185,7 +185,8 @@ async fn a_stop_is_answered_while_520_sockets_have_asked_for_the_page_and_never_
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_stream_of_events_that_is_read_outlives_useless_connections() {
-    let service = Service::with(FEW, false).await;
+    let service = Service::with(FEW).await;
+    let token = service.token("operate");
     let mut watch = service.watch("").await;
     for nuisance in NUISANCES {
         // These would take the streams instead.
@@ -195,7 +196,7 @@ async fn a_stream_of_events_that_is_read_outlives_useless_connections() {
         let mut open = Vec::new();
         for _ in 0..3 * FEW.connections {
             let mut stream = TcpStream::connect(service.address).await.unwrap();
-            nuisance.act(&mut stream, "").await;
+            nuisance.act(&mut stream, &token).await;
             open.push(stream);
         }
     }
@@ -210,7 +211,7 @@ async fn a_client_that_never_reads_is_given_up() {
         idle: std::time::Duration::from_millis(50),
         ..Limits::DEFAULT
     };
-    let service = Service::with(limits, false).await;
+    let service = Service::with(limits).await;
     let mut stream = TcpStream::connect(service.address).await.unwrap();
     let request = "GET / HTTP/1.1\r\nHost: localhost\r\n\r\n";
     // Goes on until the daemon has closed the connection.
