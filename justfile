@@ -19,6 +19,6 @@ ci:
 bench:
     cargo bench -p pdv --bench model
 
-# A trial at full length, by hand: campaign, wire, kills, strangers, host or peer
+# A trial at full length, by hand: campaign, wire, kills, operator, floods, strangers, host or peer
 trials name:
     .ci/trials {{ name }}

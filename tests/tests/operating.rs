@@ -8,8 +8,8 @@ use std::path::Path;
 
 /// Enums whose variants are codes, as files, the API and the page spell them.
 const CODES: [(&str, &str); 4] = [
-    ("crates/goniod/src/view/fault.rs", "FaultCode"),
-    ("crates/goniod/src/state.rs", "JobState"),
+    ("crates/api/src/fault.rs", "FaultCode"),
+    ("crates/api/src/state.rs", "JobState"),
     ("crates/rig/src/fault.rs", "FaultKind"),
     ("crates/capture/src/reading.rs", "Flag"),
 ];

@@ -3,8 +3,10 @@
 // The exemption for tests does not reach what they share.
 #![allow(clippy::unwrap_used)]
 
+mod acknowledgement;
 mod law;
 mod pairs;
 mod script;
 mod sequences;
+mod silence;
 mod world;

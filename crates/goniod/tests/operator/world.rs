@@ -88,14 +88,15 @@ impl World {
         (self.bench.expect("it lived"), marks)
     }
 
-    /// One life of the daemon. Returns what is left to happen in the next one.
-    async fn live<'a>(&mut self, script: &'a [(Op, Delay)]) -> Option<&'a [(Op, Delay)]> {
+    /// Starts the program; returns once it knows the rig.
+    pub(crate) async fn open(&mut self) -> (Daemon, SharedBench) {
         let file = &self.file;
         let bench = self.bench.get_or_insert_with(|| {
             let bench = InProcessRig::new(file).unwrap().bench();
             bench.keep_writes();
             bench
         });
+        let bench = bench.clone();
         // A store that is out of order when the program starts keeps it from starting at all.
         self.store.behave(Behaviour::Prompt);
         let settings = Settings {
@@ -110,6 +111,17 @@ impl World {
             .unwrap();
         let mut rig = daemon.rig();
         rig.wait_for(|rig| rig.connected).await.unwrap();
+        drop(rig);
+        (daemon, bench)
+    }
+
+    pub(crate) fn store(&self) -> &Memory {
+        &self.store
+    }
+
+    /// One life of the daemon. Returns what is left to happen in the next one.
+    async fn live<'a>(&mut self, script: &'a [(Op, Delay)]) -> Option<&'a [(Op, Delay)]> {
+        let (daemon, _) = self.open().await;
         for (i, &(op, delay)) in script.iter().enumerate() {
             if op == Op::Restart {
                 return Some(&script[i + 1..]);
