@@ -301,8 +301,7 @@ class Flood:
 
     def __init__(self, daemon, folder, trace):
         self.daemon, self.trace, self.socket = daemon, trace, Path(folder, "goniod.sock")
-        self.tokens = Path(folder, "tokens.toml")
-        self.token = next(line.split('"')[1] for line in self.tokens.read_text().splitlines() if line.startswith("operate"))
+        self.token = daemon.token
         self.token_file = Path(folder, "token")
         self.token_file.write_text(self.token)
         self.token_file.chmod(0o600)
@@ -360,7 +359,7 @@ class Flood:
         begun = time.time()
         if way == "gonioctl":
             subprocess.run([self.daemon.program.with_name("gonioctl"), "estop", "--daemon", f"unix:{self.socket}",
-                            "--token-file", self.token_file], check=True, stdout=subprocess.DEVNULL)
+                            "--token-file", self.token_file], check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         else:
             with self.connect(unix=way == "unix") as connection:
                 connection.sendall(self.request("POST", "/api/v1/estop"))
@@ -470,7 +469,7 @@ def measure(program, what, folder, stack):
     if what == "flood":
         port, trace = stack.enter_context(traced_bus(program, folder))
         rig = f'[bus]\nport = "{port}"\n'
-        more = ["--listen", f"unix:{folder}/goniod.sock", "--tokens", f"{folder}/tokens.toml"]
+        more = ["--listen", f"unix:{folder}/goniod.sock"]
     elif what == "stop":
         port, told = stack.enter_context(tapped_bus(program))
         rig = f'[bus]\nport = "{port}"\n'

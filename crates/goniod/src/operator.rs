@@ -36,7 +36,7 @@ pub(crate) struct OperatorControl {
 /// How often the operator stopped the rig, for whoever has to react.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Signal {
-    /// Stops and emergency stops so far.
+    /// Stops and emergency stops so far that the worker has to carry out.
     pub(crate) stops: u64,
     /// Emergency stops so far.
     pub(crate) emergency_stops: u64,
@@ -51,6 +51,10 @@ pub(crate) struct Signal {
 struct State {
     /// What must survive the program.
     record: OperatorRecord,
+    /// Stops and emergency stops so far; a request that came in before the latest moves nothing.
+    presses: u64,
+    /// Whether the worker was told of a stop, and nothing has been let move since.
+    stopped: bool,
     /// Stops that are not answered yet: whatever is received meanwhile moves nothing.
     unanswered: usize,
     /// The motion under way.
@@ -90,6 +94,8 @@ impl OperatorControl {
         let control = Arc::new(Self {
             state: Mutex::new(State {
                 record,
+                presses: 0,
+                stopped: false,
                 unanswered: 0,
                 motion: None,
                 closing: false,
@@ -112,7 +118,7 @@ impl OperatorControl {
     /// Notes that a request has come in. To be called before anything is waited for.
     pub(crate) fn receive(&self) -> Receipt {
         let state = self.state();
-        Receipt::new(self.signal.borrow().stops, state.unanswered > 0)
+        Receipt::new(state.presses, state.unanswered > 0)
     }
 
     /// Lets a motion begin that was asked for by a request. What a stop holds goes on where an operator starts a job.
@@ -131,7 +137,7 @@ impl OperatorControl {
         if state.closing {
             return Err(Refusal::unavailable("the daemon is shutting down"));
         }
-        if state.unanswered > 0 || !receipt.is_after(self.signal.borrow().stops) {
+        if state.unanswered > 0 || !receipt.is_after(state.presses) {
             return Err(Refusal::conflict(
                 "the rig was stopped after this was asked for; ask again",
             ));
@@ -150,6 +156,7 @@ impl OperatorControl {
         }
         let command = watch::Sender::new(Command::Run);
         let receiver = command.subscribe();
+        state.stopped = false;
         state.motion = Some(Motion {
             command,
             released: false,
@@ -314,12 +321,18 @@ impl OperatorControl {
             motion.escalate(command);
         }
         change(&mut state);
+        state.presses += 1;
+        // A stop of what stands still since the last one changes nothing: however often it is pressed, nobody is woken.
+        let news = command == Command::Estop || !state.stopped || state.motion.is_some();
+        state.stopped = true;
         self.file.keep(&state.record);
-        self.signal.send_modify(|signal| {
-            signal.stops += 1;
-            signal.emergency_stops += u64::from(command == Command::Estop);
-            signal.command = state.command();
-        });
+        if news {
+            self.signal.send_modify(|signal| {
+                signal.stops += 1;
+                signal.emergency_stops += u64::from(command == Command::Estop);
+                signal.command = state.command();
+            });
+        }
         self.show(&state);
         Answer {
             control: self.clone(),
