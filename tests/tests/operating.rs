@@ -15,11 +15,12 @@ const CODES: [(&str, &str); 4] = [
 ];
 
 /// Files whose error texts a technician may meet.
-const MESSAGES: [&str; 6] = [
+const MESSAGES: [&str; 7] = [
     "crates/rig/src/error.rs",
     "crates/rig/src/drive/error.rs",
     "crates/arms/src/envelope.rs",
     "crates/capture/src/error.rs",
+    "crates/session/src/error.rs",
     "crates/goniod/src/error.rs",
     "crates/goniod/src/store.rs",
 ];

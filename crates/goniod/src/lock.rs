@@ -2,6 +2,8 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::Write;
 use std::path::Path;
 
+use session::SessionError;
+
 use crate::DaemonError;
 
 /// Held as long as a daemon uses its data folder; the system releases it whatever ends the process.
@@ -14,7 +16,7 @@ impl Lock {
     /// # Errors
     /// Another daemon has it; the file cannot be made.
     pub(crate) fn take(data: &Path) -> Result<Self, DaemonError> {
-        let unwritable = |source| DaemonError::Out {
+        let unwritable = |source| SessionError::Out {
             path: data.to_owned(),
             source,
         };
@@ -31,7 +33,7 @@ impl Lock {
                     path: data.to_owned(),
                 });
             }
-            Err(TryLockError::Error(source)) => return Err(unwritable(source)),
+            Err(TryLockError::Error(source)) => return Err(unwritable(source).into()),
         }
         // For whoever looks who has it.
         let noted = file

@@ -195,8 +195,8 @@ impl OperatorControl {
         answer.wait().await.map(|()| id)
     }
 
-    /// Latches a fault that ended a motion. Returns it.
-    pub(crate) fn latch(&self, code: FaultCode, text: String) -> FaultView {
+    /// Latches a fault that ended a motion.
+    pub(crate) fn latch(&self, code: FaultCode, text: String) {
         let run = self.view.borrow().run.clone();
         let latched = fault(code, text, run, (self.clock)());
         tracing::error!(?code, fault = %latched.id, "fault: {}", latched.text);
@@ -205,13 +205,8 @@ impl OperatorControl {
         self.file.keep(&state.record);
         self.show(&state);
         drop(state);
-        self.log.publish(
-            latched.at.clone(),
-            What::Fault {
-                fault: latched.clone(),
-            },
-        );
-        latched
+        self.log
+            .publish(latched.at.clone(), What::Fault { fault: latched });
     }
 
     /// Ends the fault of this id, where it is the newest; starts nothing. An earlier one that is still latched is shown

@@ -3,7 +3,7 @@ use std::time::Duration;
 
 use arms::{Arm, ArmAngle};
 use capture::Command;
-use rig::{Drive, DriveError, Fault, FaultKind, Rig};
+use rig::{DriveError, Fault, FaultKind};
 use session::SessionError;
 use tokio::sync::{mpsc, watch};
 
@@ -83,13 +83,13 @@ impl<S: RigSource> RigWorker<S> {
             .source
             .open(&worker.shared.rig, &worker.shared.settings.rig_name);
         let opened = opened.map(|rig| worker.rig = Some(rig));
-        if let Err(error) = opened.map_err(DaemonError::from) {
-            let elsewhere = matches!(&error, DaemonError::Port { source, .. }
+        if let Err(error) = opened {
+            let elsewhere = matches!(&error, SessionError::Port { source, .. }
                 if matches!(**source, rig::RigError::PortLocked { .. }));
-            if elsewhere || matches!(error, DaemonError::Sim { .. }) {
-                return Err(error);
+            if elsewhere || matches!(error, SessionError::Sim { .. }) {
+                return Err(error.into());
             }
-            worker.show_trouble(&error);
+            worker.show_trouble(&error.into());
         }
         // The queue hands over one task at a time.
         let (tasks, todo) = mpsc::channel(1);
@@ -223,7 +223,7 @@ impl<S: RigSource> RigWorker<S> {
                 let Some(rig) = &mut self.rig else {
                     return Vec::new();
                 };
-                stop_arms(&mut rig.drive, at_once).await
+                rig.drive.make_safe(at_once).await
             };
             let failed = tokio::select! {
                 biased;
@@ -262,16 +262,6 @@ impl<S: RigSource> RigWorker<S> {
     }
 }
 
-/// Brakes the arms on their profiles, or stops them at once, lamp off, and lets go of them. Returns what failed.
-async fn stop_arms<R: Rig>(drive: &mut Drive<R>, at_once: bool) -> Vec<DriveError<R::Error>> {
-    let mut failed = match at_once {
-        true => drive.halt_all().await,
-        false => drive.stop_all().await,
-    };
-    failed.extend(drive.disengage_all().await);
-    failed
-}
-
 /// Returns once a stop has come that was not carried out yet.
 async fn pressed(signal: &mut watch::Receiver<Signal>, applied: Signal) {
     if signal
@@ -303,9 +293,9 @@ fn not_ready<E: Fault>(error: DriveError<E>) -> DaemonError {
 fn gone(error: &DaemonError) -> bool {
     matches!(
         error,
-        DaemonError::NotReady {
+        DaemonError::Session(SessionError::NotReady {
             kind: FaultKind::Disconnected,
             ..
-        }
+        })
     )
 }

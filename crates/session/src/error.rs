@@ -85,7 +85,7 @@ impl From<rig::RigError> for SessionError {
 impl SessionError {
     /// The exit status that it leads to.
     pub fn status(&self) -> Status {
-        if self.disk_full() {
+        if is_disk_full(self) {
             return Status::Stopped;
         }
         match self {
@@ -97,18 +97,14 @@ impl SessionError {
             _ => Status::Invalid,
         }
     }
+}
 
-    /// Whether the medium is full: what was measured is safe and the run can be resumed.
-    pub fn disk_full(&self) -> bool {
-        let mut cause: Option<&(dyn std::error::Error + 'static)> = Some(self);
-        while let Some(error) = cause {
-            if error.downcast_ref::<io::Error>().is_some_and(report::is_full) {
-                return true;
-            }
-            cause = error.source();
-        }
-        false
-    }
+/// Whether an error comes of a medium that is full: what was measured is safe and the run can be resumed.
+pub fn is_disk_full(error: &(dyn std::error::Error + 'static)) -> bool {
+    let causes = std::iter::successors(Some(error), |error| error.source());
+    causes
+        .filter_map(|cause| cause.downcast_ref::<io::Error>())
+        .any(report::is_full)
 }
 
 fn kind(kind: FaultKind) -> Status {

@@ -17,7 +17,7 @@ mod status;
 pub use calibrate::{Calibrated, Calibration};
 pub use certificates::Certificates;
 pub use directions::job_text;
-pub use error::SessionError;
+pub use error::{SessionError, is_disk_full};
 pub use open_rig::{OpenRig, PortOfFile, RigSource};
 pub use rig_port::RigPort;
 pub use run::{Ended, extension_planner, prepare_output, resume, run, run_directory_name};

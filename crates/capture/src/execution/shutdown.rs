@@ -1,4 +1,4 @@
-use rig::{Device, Drive, DriveError, FaultKind, Rig};
+use rig::{Device, DriveError, FaultKind, Rig};
 use sweep::SweepError;
 use tokio::sync::watch;
 
@@ -122,7 +122,7 @@ impl<R: Rig> Execution<'_, R> {
                 () = emergency_stop(&mut control), if !*halted => {
                     *halted = true;
                     if self.touched {
-                        for error in stop_arms(self.drive, true).await {
+                        for error in self.drive.make_safe(true).await {
                             tracing::warn!("while stopping: {}", chain(&error));
                         }
                     }
@@ -152,11 +152,11 @@ impl<R: Rig> Execution<'_, R> {
         if !at_once {
             tokio::select! {
                 biased;
-                failed = stop_arms(self.drive, false) => return failed,
+                failed = self.drive.make_safe(false) => return failed,
                 () = emergency_stop(&mut control) => {}
             }
         }
-        stop_arms(self.drive, true).await
+        self.drive.make_safe(true).await
     }
 }
 
@@ -170,16 +170,6 @@ async fn emergency_stop(control: &mut watch::Receiver<Command>) {
         // Nobody is left who could ask.
         std::future::pending::<()>().await;
     }
-}
-
-/// Stops the arms, on their profiles or at once, lamp off, and lets go of them. Returns what failed.
-async fn stop_arms<R: Rig>(drive: &mut Drive<R>, at_once: bool) -> Vec<DriveError<R::Error>> {
-    let mut failed = match at_once {
-        true => drive.halt_all().await,
-        false => drive.stop_all().await,
-    };
-    failed.extend(drive.disengage_all().await);
-    failed
 }
 
 /// An error with its causes.

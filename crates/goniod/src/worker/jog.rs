@@ -1,7 +1,7 @@
 use arms::{Arm, ArmAngle, Pose};
 use capture::{Command, mechanics};
 
-use super::{RigWorker, gone, not_ready, stop_arms, stopped};
+use super::{RigWorker, gone, not_ready, stopped};
 use crate::daemon::Reply;
 use crate::operator::Permit;
 use crate::queue::WorkerEvent;
@@ -85,7 +85,7 @@ impl<S: RigSource> RigWorker<S> {
             result = driven => match result {
                 Ok(_) => None,
                 Err(error) => {
-                    stop_arms(&mut open.drive, false).await;
+                    open.drive.make_safe(false).await;
                     let fault = (view::fault_code(error.kind()), chain(&error));
                     if gone(&not_ready(error)) {
                         self.rig = None;
@@ -97,7 +97,7 @@ impl<S: RigSource> RigWorker<S> {
         let drive = &mut open.drive;
         let left = match asked {
             // An emergency stop that comes while the arms brake is carried out right after.
-            Some(asked) => stop_arms(drive, asked == Command::Estop).await,
+            Some(asked) => drive.make_safe(asked == Command::Estop).await,
             None => drive.disengage_all().await,
         };
         let error = left.into_iter().next()?;

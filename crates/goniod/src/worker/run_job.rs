@@ -9,7 +9,7 @@ use crate::queue::{Ending, WorkerEvent};
 use crate::refusal::chain;
 use crate::store::StoreJournal;
 use crate::{Activity, DaemonError, FaultCode, Job, RigSource, RunView, view};
-use session::RunRequest;
+use session::{RunRequest, SessionError, is_disk_full};
 
 /// How a capture ended, and the fault that ended it.
 type Captured = (Outcome, Option<FaultCode>);
@@ -177,16 +177,21 @@ impl<S: RigSource> RigWorker<S> {
 fn ending(error: &DaemonError) -> (Ending, Option<FaultCode>) {
     let why = chain(error);
     let fault = match error {
-        DaemonError::Job(sweep::SweepError::Start { .. }) => FaultCode::Refused,
-        DaemonError::Job(_) | DaemonError::Rig(_) => return (Ending::Failed { why }, None),
-        DaemonError::NotReady { kind, .. } => view::fault_code(*kind),
-        DaemonError::Port { source, .. } => view::fault_code(rig::Fault::kind(source.as_ref())),
+        DaemonError::Session(SessionError::Job(sweep::SweepError::Start { .. })) => FaultCode::Refused,
+        DaemonError::Session(SessionError::Job(_) | SessionError::Rig(_)) => {
+            return (Ending::Failed { why }, None);
+        }
+        DaemonError::Session(SessionError::NotReady { kind, .. }) => view::fault_code(*kind),
+        DaemonError::Session(SessionError::Port { source, .. }) => {
+            view::fault_code(rig::Fault::kind(source.as_ref()))
+        }
         DaemonError::Store(error) => error.code(),
-        DaemonError::Journal(error) => store_code(error),
-        DaemonError::Capture(capture::CaptureError::Journal(error)) => store_code(error),
-        DaemonError::Capture(_) | DaemonError::OtherRig { .. } => FaultCode::Mismatch,
-        error if error.disk_full() => FaultCode::DiskFull,
-        DaemonError::Report(_) => FaultCode::Report,
+        DaemonError::Session(
+            SessionError::Journal(error) | SessionError::Capture(capture::CaptureError::Journal(error)),
+        ) => store_code(error),
+        DaemonError::Session(SessionError::Capture(_)) | DaemonError::OtherRig { .. } => FaultCode::Mismatch,
+        error if is_disk_full(error) => FaultCode::DiskFull,
+        DaemonError::Session(SessionError::Report(_)) => FaultCode::Report,
         _ => FaultCode::Setup,
     };
     (Ending::Interrupted { why }, Some(fault))

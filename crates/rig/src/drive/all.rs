@@ -84,6 +84,17 @@ impl<R: Rig> Drive<R> {
         self.all(Verb::Disengage).await
     }
 
+    /// Stops the arms, on their profiles or `at_once`, lamp off, and lets go of them. Every device is told, whatever
+    /// happens to the others; what failed is returned.
+    pub async fn make_safe(&mut self, at_once: bool) -> Vec<DriveError<R::Error>> {
+        let mut failed = match at_once {
+            true => self.halt_all().await,
+            false => self.stop_all().await,
+        };
+        failed.extend(self.disengage_all().await);
+        failed
+    }
+
     /// Goes round the devices rather than waiting for a silent one: the others must not move on meanwhile.
     async fn all(&mut self, verb: Verb) -> Vec<DriveError<R::Error>> {
         let silence = self.file.bus.silence;
