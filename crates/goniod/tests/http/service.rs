@@ -1,4 +1,5 @@
 use std::net::SocketAddr;
+use std::path::Path;
 
 use goniod::http::{Access, Address, Limits, Listener, Tokens, serve};
 use goniod::{Daemon, Settings};
@@ -30,6 +31,25 @@ pub(crate) struct Answer {
     pub(crate) body: Vec<u8>,
 }
 
+/// A daemon on an ideal rig.
+pub(crate) fn settings(data: &Path) -> Settings {
+    Settings {
+        rig: "[sim]\nimperfections = \"none\"\n".to_owned(),
+        rig_name: "test rig".to_owned(),
+        data: data.to_owned(),
+        clock: std::time::SystemTime::now,
+    }
+}
+
+/// A token of the token file in a data folder.
+pub(crate) fn token(data: &Path, role: &str) -> String {
+    let text = std::fs::read_to_string(data.join("tokens.toml")).unwrap();
+    text.parse::<toml::Table>().unwrap()[role]
+        .as_str()
+        .unwrap()
+        .to_owned()
+}
+
 impl Service {
     pub(crate) async fn start() -> Self {
         Self::with(Limits::default()).await
@@ -38,14 +58,7 @@ impl Service {
     /// Its tokens are in the file tokens.toml of the data folder.
     pub(crate) async fn with(limits: Limits) -> Self {
         let data = tempfile::tempdir().unwrap();
-        let daemon = Daemon::open(Settings {
-            rig: "[sim]\nimperfections = \"none\"\n".to_owned(),
-            rig_name: "test rig".to_owned(),
-            data: data.path().to_owned(),
-            clock: std::time::SystemTime::now,
-        })
-        .await
-        .unwrap();
+        let daemon = Daemon::open(settings(data.path())).await.unwrap();
         let listener = Listener::bind(&"127.0.0.1:0".parse().unwrap()).await.unwrap();
         let Address::Tcp(address) = listener.address().unwrap() else {
             panic!("TCP was asked for");
@@ -67,11 +80,7 @@ impl Service {
 
     /// A token of the token file.
     pub(crate) fn token(&self, role: &str) -> String {
-        let text = std::fs::read_to_string(self.data.path().join("tokens.toml")).unwrap();
-        text.parse::<toml::Table>().unwrap()[role]
-            .as_str()
-            .unwrap()
-            .to_owned()
+        token(self.data.path(), role)
     }
 
     /// The header by which the bearer of a token says who it is.

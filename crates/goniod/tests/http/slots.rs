@@ -1,12 +1,12 @@
 //! Whoever wants to stop the rig gets in, whatever other clients do with their connections.
 
+use goniod::Daemon;
 use goniod::http::{Access, Address, Limits, Listener, Tokens, serve};
-use goniod::{Daemon, Settings};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::{TcpStream, UnixStream};
 use tokio::sync::oneshot;
 
-use crate::service::Service;
+use crate::service::{Service, settings, token};
 
 /// What a client does with its connection that does no good.
 #[derive(Clone, Copy, Debug)]
@@ -87,28 +87,39 @@ async fn estop(mut stream: impl AsyncRead + AsyncWrite + Unpin, token: &str) -> 
     String::from_utf8_lossy(&answer[..read]).into_owned()
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn a_stop_is_answered_while_useless_connections_take_all_slots() {
-    let service = Service::with(FEW).await;
-    let token = service.token("operate");
-    let connect = async || TcpStream::connect(service.address).await.unwrap();
+/// Opens useless connections of each kind, far more than there are slots, and stops the rig over new ones meanwhile.
+async fn stops_get_through<S>(connect: impl AsyncFn() -> S, token: &str)
+where
+    S: AsyncRead + AsyncWrite + Unpin,
+{
     for nuisance in NUISANCES {
         let mut open = Vec::new();
         for _ in 0..3 * FEW.connections {
             let mut stream = connect().await;
-            nuisance.act(&mut stream, &token).await;
+            nuisance.act(&mut stream, token).await;
             open.push(stream);
         }
         for _ in 0..10 {
-            let answer = estop(connect().await, &token).await;
+            let answer = estop(connect().await, token).await;
             assert!(answer.starts_with("HTTP/1.1 204"), "{nuisance:?}: {answer:?}");
             for stream in &mut open {
                 if matches!(nuisance, SendsAByteAtATime) {
-                    nuisance.act(stream, &token).await;
+                    nuisance.act(stream, token).await;
                 }
             }
         }
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_stop_is_answered_while_useless_connections_take_all_slots() {
+    let service = Service::with(FEW).await;
+    let token = service.token("operate");
+    stops_get_through(
+        async || TcpStream::connect(service.address).await.unwrap(),
+        &token,
+    )
+    .await;
     service.end().await;
 }
 
@@ -116,40 +127,17 @@ async fn a_stop_is_answered_while_useless_connections_take_all_slots() {
 async fn a_stop_over_a_unix_socket_is_answered_while_useless_connections_take_all_slots() {
     let data = tempfile::tempdir().unwrap();
     let path = data.path().join("goniod.sock");
-    let daemon = Daemon::open(Settings {
-        rig: "[sim]\nimperfections = \"none\"\n".to_owned(),
-        rig_name: "test rig".to_owned(),
-        data: data.path().to_owned(),
-        clock: std::time::SystemTime::now,
-    })
-    .await
-    .unwrap();
+    let daemon = Daemon::open(settings(data.path())).await.unwrap();
     let address: Address = format!("unix:{}", path.display()).parse().unwrap();
     let listener = Listener::bind(&address).await.unwrap();
     let tokens = data.path().join("tokens.toml");
     let access = Access::new(None, [], Some(Tokens::open(&tokens).unwrap()), &FEW);
-    let text = std::fs::read_to_string(&tokens).unwrap();
-    let token = text.parse::<toml::Table>().unwrap()["operate"]
-        .as_str()
-        .unwrap()
-        .to_owned();
+    let token = token(data.path(), "operate");
     let (close, closed) = oneshot::channel::<()>();
     let server = tokio::spawn(serve(listener, access, FEW, daemon.clone(), async {
         let _ = closed.await;
     }));
-    let connect = async || UnixStream::connect(&path).await.unwrap();
-    for nuisance in NUISANCES {
-        let mut open = Vec::new();
-        for _ in 0..3 * FEW.connections {
-            let mut stream = connect().await;
-            nuisance.act(&mut stream, &token).await;
-            open.push(stream);
-        }
-        for _ in 0..10 {
-            let answer = estop(connect().await, &token).await;
-            assert!(answer.starts_with("HTTP/1.1 204"), "{nuisance:?}: {answer:?}");
-        }
-    }
+    stops_get_through(async || UnixStream::connect(&path).await.unwrap(), &token).await;
     daemon.shutdown().await;
     drop(close);
     server.await.unwrap().unwrap();
