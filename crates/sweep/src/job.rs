@@ -70,12 +70,12 @@ pub struct Arc {
 #[serde(rename_all = "lowercase")]
 pub enum Model {
     /// The paper's product F(θ_r)·G(d_p) in the logarithmic domain (Eq. 3).
-    #[default]
     Separable,
     /// The first plane and the arc, reciprocally: a lobe over θ_h whose peak over θ_d is read on the arc, and a
     /// diffuse floor.
     Reciprocal,
-    /// The same of all planes and the arc, interpolated between the planes.
+    /// The same of all planes and the arc, interpolated between the planes. What a job gets that names no model.
+    #[default]
     Planes,
     /// A table over half and difference angle of all planes and the arc (Romeiro 2008), a baseline.
     Bivariate,

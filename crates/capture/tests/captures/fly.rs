@@ -8,13 +8,13 @@ use rig::dynamixel::register;
 use rig::{Device, RigFile};
 use sweep::Sweep;
 
-use crate::bench::{QUICKSTART, SERVOS, Scene, peek};
+use crate::bench::{PAPER, SERVOS, Scene, peek};
 
 const SHORT: &str =
     "[[plane]]\ntheta_r_deg = 60\nreadings = 24\n[arc]\nreadings = 16\n[sweep]\nmode = \"fly\"";
 
-fn quickstart() -> String {
-    QUICKSTART.replace("mode = \"step\"", "mode = \"fly\"")
+fn paper() -> String {
+    PAPER.replace("mode = \"step\"", "mode = \"fly\"")
 }
 
 /// Seconds of a whole capture.
@@ -36,8 +36,8 @@ fn in_flight(scene: &Scene) -> Vec<&Reading> {
 async fn a_flight_is_three_times_as_fast_as_stopping_and_below_40_s() {
     for specimen in ["gold-paint", "chrome", "alum-bronze", "nickel"] {
         let sim = format!("specimen = \"{specimen}\"");
-        let stepped_s = seconds(&mut Scene::new(QUICKSTART, &sim).await).await;
-        let mut scene = Scene::new(&quickstart(), &sim).await;
+        let stepped_s = seconds(&mut Scene::new(PAPER, &sim).await).await;
+        let mut scene = Scene::new(&paper(), &sim).await;
         let flown_s = seconds(&mut scene).await;
         let planned_s = scene.journal.plan().seconds();
         let lit = scene.journal.accepted().iter().filter(|r| r.lamp).count();

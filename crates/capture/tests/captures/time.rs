@@ -6,7 +6,7 @@ use rig::RigFile;
 use rig::dynamixel::register::servo;
 use sweep::{Mechanics, Sweep};
 
-use crate::bench::{QUICKSTART, SERVOS, SHORT, Scene, assert_complete, peek};
+use crate::bench::{PAPER, SERVOS, SHORT, Scene, assert_complete, peek};
 
 /// Units of the profile registers in degrees/s and degrees/s²: 0.229 rev/min and 214.577 rev/min² (e-manual, "Profile
 /// Velocity(112)", "Profile Acceleration(108)").
@@ -41,7 +41,7 @@ fn of(readings: &[&Reading], sweep: Sweep) -> usize {
 #[tokio::test(start_paused = true)]
 async fn a_full_capture_takes_hardly_longer_than_its_motion_settling_and_light() {
     for specimen in ["gold-paint", "chrome", "alum-bronze"] {
-        let mut scene = Scene::new(QUICKSTART, &format!("specimen = \"{specimen}\"")).await;
+        let mut scene = Scene::new(PAPER, &format!("specimen = \"{specimen}\"")).await;
         let start = scene.bench.pose();
         let before = scene.bench.now();
         assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);

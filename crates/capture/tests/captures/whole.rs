@@ -3,11 +3,11 @@ use rig::dynamixel::register::servo;
 use rig::{Device, RigFile};
 use sweep::Sweep;
 
-use crate::bench::{QUICKSTART, SERVOS, SHORT, Scene, assert_complete, peek};
+use crate::bench::{PAPER, SERVOS, SHORT, Scene, assert_complete, peek};
 
 #[tokio::test(start_paused = true)]
 async fn a_capture_reads_every_step_once_and_leaves_the_rig_safe() {
-    let mut scene = Scene::new(QUICKSTART, "specimen = \"gold-paint\"").await;
+    let mut scene = Scene::new(PAPER, "specimen = \"gold-paint\"").await;
     assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
     assert_complete(&scene.journal);
     scene.assert_safe();
@@ -38,7 +38,7 @@ async fn a_capture_takes_the_time_that_was_planned() {
         ("white-paint", 0.05),
         ("chrome", 0.05),
     ] {
-        let mut scene = Scene::new(QUICKSTART, &format!("specimen = \"{specimen}\"")).await;
+        let mut scene = Scene::new(PAPER, &format!("specimen = \"{specimen}\"")).await;
         let before = scene.bench.now();
         let mut left = Vec::new();
         let bench = scene.bench.clone();

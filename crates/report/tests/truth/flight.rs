@@ -11,7 +11,7 @@ use sweep::Sweep;
 
 use crate::bench::Laboratory;
 
-const QUICKSTART: &str = include_str!("../../../../config/jobs/quickstart.toml");
+const PAPER: &str = include_str!("../../../../config/jobs/paper.toml");
 
 /// A capture: seconds of rig time, root mean square and median of the relative errors of what was observed, MALE of the
 /// reconstruction.
@@ -74,10 +74,10 @@ fn seconds(records: &[Record]) -> f64 {
 
 #[tokio::test(start_paused = true)]
 async fn a_flight_is_as_true_as_stopping_in_a_third_of_the_time() {
-    let fly = QUICKSTART.replace("mode = \"step\"", "mode = \"fly\"");
+    let fly = PAPER.replace("mode = \"step\"", "mode = \"fly\"");
     for name in ["gold-paint", "chrome", "alum-bronze", "nickel"] {
         let specimen = brdf::specimen(name).unwrap();
-        let [stepped, flown] = [score(&specimen, QUICKSTART).await, score(&specimen, &fly).await];
+        let [stepped, flown] = [score(&specimen, PAPER).await, score(&specimen, &fly).await];
         for (mode, s) in [("stepped", &stepped), ("flown", &flown)] {
             println!(
                 "{name} {mode}: {:.1} s, errors rms {:.2} %, median {:.2} %, MALE {:.5}",

@@ -1,11 +1,16 @@
+use std::fs;
+use std::path::Path;
+
 use sweep::{Distribution, Job, Model, Plane};
 
-use crate::QUICKSTART;
+use crate::PAPER;
+
+const QUICKSTART: &str = include_str!("../../../../config/jobs/quickstart.toml");
 
 #[test]
-fn quickstart_is_read() {
-    let job = Job::parse(QUICKSTART, "quickstart.toml").unwrap();
-    assert_eq!(job.name, "quickstart.toml");
+fn the_papers_job_is_read() {
+    let job = Job::parse(PAPER, "paper.toml").unwrap();
+    assert_eq!(job.name, "paper.toml");
     assert_eq!(job.planes.len(), 1);
     assert!((job.planes[0].theta_r.to_degrees() - 70.0).abs() < 1e-12);
     assert_eq!(
@@ -17,10 +22,50 @@ fn quickstart_is_read() {
 }
 
 #[test]
-fn what_is_not_said_is_capped_separable_and_without_arc() {
+fn what_is_not_said_is_capped_of_planes_and_without_arc() {
     let job = Job::parse("[[plane]]\ntheta_r_deg = 45\nreadings = 5", "").unwrap();
     assert_eq!(job.planes[0].distribution, Distribution::Capped);
-    assert_eq!((job.arc, job.model), (None, Model::Separable));
+    assert_eq!((job.arc, job.model), (None, Model::Planes));
+}
+
+/// Whoever copies a job must not copy with it that the specimen is there, or a model that is worse than the rest.
+#[test]
+fn no_job_that_comes_with_the_program_says_that_its_specimen_is_on_the_stage() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../config/jobs");
+    let files: Vec<_> = fs::read_dir(folder)
+        .unwrap()
+        .map(|file| file.unwrap().path())
+        .collect();
+    assert!(files.len() > 4, "{files:?}");
+    for file in files {
+        let name = file.file_name().unwrap().to_str().unwrap();
+        let job = Job::parse(&fs::read_to_string(&file).unwrap(), name).unwrap();
+        assert!(!job.on_stage, "{name}");
+        let expected = match name {
+            "paper.toml" => Model::Separable,
+            _ => Model::Planes,
+        };
+        assert_eq!(job.model, expected, "{name}");
+    }
+}
+
+#[test]
+fn the_first_job_is_three_planes_and_a_short_arc() {
+    let job = Job::parse(QUICKSTART, "quickstart.toml").unwrap();
+    let planes: Vec<_> = job
+        .planes
+        .iter()
+        .map(|plane| {
+            (
+                plane.theta_r.to_degrees().round(),
+                plane.readings,
+                plane.distribution,
+            )
+        })
+        .collect();
+    let plane = |theta_r_deg| (theta_r_deg, 14, Distribution::Lobe);
+    assert_eq!(planes, [plane(20.0), plane(45.0), plane(70.0)]);
+    assert_eq!(job.arc.map(|arc| arc.readings), Some(6));
 }
 
 /// A job that stops when good enough may leave its first sweeps to the program, which goes by its scene.

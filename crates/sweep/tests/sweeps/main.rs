@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 use arms::{ArmAngle, Envelope, Limits, Pose, Profile};
 use sweep::{Job, Mechanics, Plan, Step, Sweep};
 
-const QUICKSTART: &str = include_str!("../../../../config/jobs/quickstart.toml");
+const PAPER: &str = include_str!("../../../../config/jobs/paper.toml");
 
 /// A rig like that of config/rig.toml.
 fn mechanics() -> Mechanics {

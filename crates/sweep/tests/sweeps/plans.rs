@@ -1,11 +1,11 @@
 use arms::{Arm, ArmAngle, Pose};
 use sweep::{Light, Mechanics, Step, Sweep, SweepError, plan, way};
 
-use crate::{QUICKSTART, job, mechanics, poses, steps};
+use crate::{PAPER, job, mechanics, poses, steps};
 
 #[test]
-fn quickstart_takes_every_reading_it_asks_for() {
-    let plan = plan(&job(QUICKSTART), &mechanics()).unwrap();
+fn the_papers_job_takes_every_reading_it_asks_for() {
+    let plan = plan(&job(PAPER), &mechanics()).unwrap();
     assert_eq!(poses(&plan, Sweep::Plane(0)).len(), 90);
     assert_eq!(poses(&plan, Sweep::Arc).len(), 90);
     let left_out: Vec<String> = plan
@@ -26,7 +26,7 @@ fn quickstart_takes_every_reading_it_asks_for() {
 
 #[test]
 fn dark_readings_come_first_where_the_arms_stand() {
-    let plan = plan(&job(QUICKSTART), &mechanics()).unwrap();
+    let plan = plan(&job(PAPER), &mechanics()).unwrap();
     let dark: Vec<&Step> = steps(&plan, Sweep::Dark).collect();
     assert!(
         dark.iter().enumerate().all(|(i, step)| step.index == i),
@@ -62,7 +62,7 @@ fn dark_readings_come_first_where_the_arms_stand() {
 
 #[test]
 fn a_plane_covers_both_sides_of_the_mirror_direction_and_holds_the_sensor() {
-    let plan = plan(&job(QUICKSTART), &mechanics()).unwrap();
+    let plan = plan(&job(PAPER), &mechanics()).unwrap();
     let poses = poses(&plan, Sweep::Plane(0));
     let sensor = poses[0].sensor;
     assert!((sensor.deg() - 70.0).abs() <= 0.044, "{}", sensor.deg());
@@ -113,7 +113,7 @@ fn the_arc_keeps_its_offset_and_meets_each_plane_in_one_pose() {
 
 #[test]
 fn the_mirror_arc_reaches_from_half_the_separation_to_the_limits() {
-    let plan = plan(&job(QUICKSTART), &mechanics()).unwrap();
+    let plan = plan(&job(PAPER), &mechanics()).unwrap();
     let mut sensor: Vec<f64> = poses(&plan, Sweep::Arc)
         .iter()
         .map(|pose| pose.sensor.deg())
@@ -177,7 +177,7 @@ fn what_this_rig_cannot_do_is_refused_with_the_key() {
         mechanics.envelope.sensor.max = ArmAngle::from_deg(60.0);
         mechanics
     };
-    let error = plan(&job(QUICKSTART), &small(mechanics())).unwrap_err();
+    let error = plan(&job(PAPER), &small(mechanics())).unwrap_err();
     assert_eq!(
         error.to_string(),
         "job.toml: plane[0].theta_r_deg: nothing can be measured at 70.0°: the sensor arm may be at -88.0° … 60.0°"
@@ -197,13 +197,13 @@ fn what_this_rig_cannot_do_is_refused_with_the_key() {
         start: Some(Pose::from_deg(-91.0, 45.0)),
         ..mechanics()
     };
-    let error = plan(&job(QUICKSTART), &outside).unwrap_err();
+    let error = plan(&job(PAPER), &outside).unwrap_err();
     assert!(matches!(error, SweepError::Start { .. }), "{error}");
     let touching = Mechanics {
         start: Some(Pose::from_deg(44.0, 45.0)),
         ..mechanics()
     };
-    let error = plan(&job(QUICKSTART), &touching).unwrap_err();
+    let error = plan(&job(PAPER), &touching).unwrap_err();
     assert!(matches!(error, SweepError::Start { .. }), "{error}");
 }
 
@@ -211,7 +211,7 @@ fn what_this_rig_cannot_do_is_refused_with_the_key() {
 #[test]
 fn an_arm_that_stands_a_hair_beyond_its_limit_may_start() {
     let start = Some(Pose::from_deg(-88.05, 88.05));
-    let plan = plan(&job(QUICKSTART), &Mechanics { start, ..mechanics() }).unwrap();
+    let plan = plan(&job(PAPER), &Mechanics { start, ..mechanics() }).unwrap();
     assert!(mechanics().envelope.check_pose(plan.steps[0].pose()).is_ok());
 }
 
@@ -277,7 +277,7 @@ fn every_approach_is_from_the_side_that_is_asked_for() {
             approach,
             ..mechanics()
         };
-        let plan = plan(&job(QUICKSTART), &mechanics).unwrap();
+        let plan = plan(&job(PAPER), &mechanics).unwrap();
         let mut from = plan.steps[0].pose();
         let mut came = [0.0; 2];
         for step in &plan.steps {
@@ -307,7 +307,7 @@ fn every_approach_is_from_the_side_that_is_asked_for() {
 #[test]
 fn seconds_are_those_of_profiles_settling_and_integration() {
     let mechanics = mechanics();
-    let plan = plan(&job(QUICKSTART), &mechanics).unwrap();
+    let plan = plan(&job(PAPER), &mechanics).unwrap();
     let mut from = plan.steps[0].pose();
     for step in &plan.steps {
         let mut motion = 0.0;
@@ -334,7 +334,7 @@ fn seconds_are_those_of_profiles_settling_and_integration() {
 #[test]
 fn without_a_known_start_the_first_way_is_not_timed() {
     let unknown = plan(
-        &job(QUICKSTART),
+        &job(PAPER),
         &Mechanics {
             start: None,
             ..mechanics()
@@ -353,7 +353,7 @@ fn without_a_known_start_the_first_way_is_not_timed() {
 #[test]
 fn the_choice_of_exposures_has_its_price_in_the_plan() {
     let mechanics = mechanics();
-    let plan = plan(&job(QUICKSTART), &mechanics).unwrap();
+    let plan = plan(&job(PAPER), &mechanics).unwrap();
     let light = Light::new(&plan, &mechanics);
     let dark_s: f64 = steps(&plan, Sweep::Dark)
         .map(|step| f64::from(step.exposure.expect("fixed").1) * 1e-6)
@@ -375,7 +375,7 @@ fn the_choice_of_exposures_has_its_price_in_the_plan() {
         "{light:?}"
     );
     // What is flown may all have to be taken again.
-    let fly = QUICKSTART.replace("mode = \"step\"", "mode = \"fly\"");
+    let fly = PAPER.replace("mode = \"step\"", "mode = \"fly\"");
     let flown = sweep::plan(&job(&fly), &mechanics).unwrap();
     let price = Light::new(&flown, &mechanics);
     assert_eq!(price.readings, 2 * lit);
