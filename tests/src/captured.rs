@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use brdf::Brdf;
-use capture::{FileJournal, Reading, Record};
+use capture::{FileJournal, Reading, Record, extended_plan};
 use pdv::{Observation, Separable};
 use report::{Measurement, measurements, observations};
 use rig::RigFile;
@@ -38,6 +38,19 @@ impl Captured {
     /// Readings in the order in which they were taken.
     pub fn readings(&self) -> impl Iterator<Item = &Reading> {
         self.measurements.iter().map(|measurement| &measurement.reading)
+    }
+
+    /// How many accepted readings each step has, of the plan and of what a hold or an interruption has added to it.
+    ///
+    /// # Panics
+    /// If a reading is of no step.
+    pub fn accepted(&self) -> Vec<usize> {
+        let plan = extended_plan(&self.records).expect("the journal begins with a header");
+        let mut accepted = vec![0; plan.steps.len()];
+        for reading in self.readings().filter(|reading| reading.accepted) {
+            accepted[reading.step] += 1;
+        }
+        accepted
     }
 
     /// The separable model of what was measured.

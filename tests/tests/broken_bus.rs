@@ -104,13 +104,7 @@ fn fault_and_resume(at: Duration, arm: &Simulator, fault: impl FnOnce(), clear: 
     let directory = broken.directory.to_str().unwrap();
     let _ = run(GONIOCTL, temporary.path(), &["run", "--resume", directory]).expect(0);
     let whole = only_run(temporary.path());
-    let Some(Record::Header(header)) = whole.records.first() else {
-        panic!("no header");
-    };
-    let mut accepted = vec![0; header.plan.steps.len()];
-    for reading in whole.readings().filter(|reading| reading.accepted) {
-        accepted[reading.step] += 1;
-    }
+    let accepted = whole.accepted();
     assert!(
         accepted.iter().all(|&n| n == 1),
         "each pose is measured once: {accepted:?}"

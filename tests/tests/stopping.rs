@@ -79,13 +79,7 @@ fn resume(directory: &Path, before: &Captured) {
         &before.records[..],
         "nothing was lost"
     );
-    let Some(Record::Header(header)) = whole.records.first() else {
-        panic!("no header");
-    };
-    let mut accepted = vec![0; header.plan.steps.len()];
-    for reading in whole.readings().filter(|reading| reading.accepted) {
-        accepted[reading.step] += 1;
-    }
+    let accepted = whole.accepted();
     assert!(accepted.iter().all(|&n| n == 1), "each pose is measured once");
     assert!(before.directory.join("brdf.binary").exists());
     // A run that is done is only reported again.

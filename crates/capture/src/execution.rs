@@ -13,6 +13,7 @@ use crate::{CaptureError, Command, Event, Journal, Reading, Record, State, close
 
 mod dark;
 mod fly;
+mod refresh;
 mod repeat;
 mod shutdown;
 mod step;
@@ -56,6 +57,8 @@ pub(crate) struct Execution<'a, R: Rig> {
     standing: Option<Pose>,
     /// Readings of a flight that has not landed.
     aloft: Vec<Reading>,
+    /// Whether the run was held since its last dark and reference readings, so that they say nothing of what follows.
+    stale: bool,
 }
 
 impl<'a, R: Rig> Execution<'a, R> {
@@ -104,6 +107,7 @@ impl<'a, R: Rig> Execution<'a, R> {
             touched: false,
             standing: None,
             aloft: Vec::new(),
+            stale: false,
         }
     }
 
@@ -118,8 +122,13 @@ impl<'a, R: Rig> Execution<'a, R> {
         self.drive.engage_all().await?;
         self.state(State::Running);
         self.report_progress();
-        if self.done.contains(&false) {
+        if let Some(next) = self.done.iter().position(|&done| !done) {
+            // A hold until now is made good by these readings too.
+            self.stale = false;
+            let to = self.plan.steps[next].pose();
+            self.refresh_dark(to).await?;
             self.repeat().await?;
+            self.refresh_reference().await?;
         }
         let mut next = 0;
         loop {
@@ -140,8 +149,7 @@ impl<'a, R: Rig> Execution<'a, R> {
                     self.standing = None;
                     continue;
                 }
-                self.obey().await?;
-                self.suspend().await?;
+                self.make_ready(step.pose()).await?;
                 self.step(&step).await?;
             }
             self.make_up(first..next).await?;
@@ -158,10 +166,9 @@ impl<'a, R: Rig> Execution<'a, R> {
                 continue;
             }
             let step = self.plan.steps[index].clone();
+            self.make_ready(step.pose()).await?;
             // Its own path leads from its neighbour in the pass.
             self.standing = self.standing.filter(|&pose| pose == step.pose());
-            self.obey().await?;
-            self.suspend().await?;
             self.step(&step).await?;
         }
         Ok(())
@@ -188,13 +195,18 @@ impl<'a, R: Rig> Execution<'a, R> {
         };
         self.append(&Record::Extension(extension.clone())).await?;
         let added = !extension.steps.is_empty();
-        let steps = self.plan.steps.len() + extension.steps.len();
-        self.done.resize(steps, false);
-        self.attempts.resize(steps, 0);
-        self.progress.extend(&extension.steps);
-        self.plan.steps.extend(extension.steps);
-        self.report_progress();
+        self.add(extension.steps);
         Ok(added)
+    }
+
+    /// Adds steps to the end of the plan.
+    fn add(&mut self, steps: Vec<Step>) {
+        let of = self.plan.steps.len() + steps.len();
+        self.done.resize(of, false);
+        self.attempts.resize(of, 0);
+        self.progress.extend(&steps);
+        self.plan.steps.extend(steps);
+        self.report_progress();
     }
 
     /// Asks every device who it is and when, and records it.

@@ -30,10 +30,11 @@ impl<R: Rig> Execution<'_, R> {
     /// before it: the arms stand there, and how bright it is nothing else tells.
     pub(super) async fn pass(&mut self, pass: usize) -> Result<(), Interrupt<R::Error>> {
         loop {
-            self.obey().await?;
-            self.suspend().await?;
-            let undone = |step: &&Step| step.pass == Some(pass) && !self.done[step.index];
-            let steps: Vec<Step> = self.plan.steps.iter().filter(undone).cloned().collect();
+            let first = self.undone(pass).next().map(Step::pose);
+            if let Some(first) = first {
+                self.make_ready(first).await?;
+            }
+            let steps: Vec<Step> = self.undone(pass).cloned().collect();
             let landed = match steps.first().map(|step| step.lamp) {
                 None => true,
                 Some(true) if !self.ranging.knows(steps[0].sweep) => {
@@ -47,6 +48,12 @@ impl<R: Rig> Execution<'_, R> {
                 return Ok(());
             }
         }
+    }
+
+    /// The steps of a pass that have no accepted reading.
+    fn undone(&self, pass: usize) -> impl Iterator<Item = &Step> {
+        let of = move |step: &&Step| step.pass == Some(pass) && !self.done[step.index];
+        self.plan.steps.iter().filter(of)
     }
 
     /// Whether the operator wants the arms held.

@@ -37,6 +37,7 @@ impl<R: Rig> Execution<'_, R> {
             at: now(),
         })
         .await?;
+        self.stale = true;
         self.state(match self.touched {
             true => State::Running,
             false => State::Identifying,

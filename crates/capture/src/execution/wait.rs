@@ -30,6 +30,7 @@ impl<R: Rig> Execution<'_, R> {
             self.mark = self.look().await?;
         }
         if paused {
+            self.stale = true;
             self.state(State::Running);
         }
         Ok(())

@@ -4,6 +4,7 @@ use std::time::Duration;
 use capture::{CaptureError, Command, Event, JournalError, Outcome, Record, State};
 use rig::Device;
 use rig::dynamixel::register::{common, servo};
+use sweep::Sweep;
 
 use crate::bench::{MemoryJournal, SERVOS, SHORT, Scene, assert_complete, peek};
 
@@ -25,7 +26,7 @@ fn after(
     }
 }
 
-/// What must be the same whether a run was stopped or not.
+/// What must be the same whether a run was stopped or not: all but what was taken again because of it.
 fn essence(journal: &MemoryJournal) -> Vec<(usize, u32, [u32; 3], rig::Exposure, arms::Pose)> {
     let reading = |reading: &&capture::Reading| {
         (
@@ -36,7 +37,68 @@ fn essence(journal: &MemoryJournal) -> Vec<(usize, u32, [u32; 3], rig::Exposure,
             reading.measured,
         )
     };
-    journal.readings().iter().map(reading).collect()
+    let planned = journal.plan().steps.len();
+    let readings = journal.readings().into_iter();
+    readings
+        .filter(|reading| reading.step < planned)
+        .map(|kept| reading(&kept))
+        .collect()
+}
+
+/// What a hold adds between two readings of the plan: so many dark readings, and so many visits to the reference pose.
+fn added(journal: &MemoryJournal) -> Vec<(usize, usize)> {
+    let planned = journal.plan().steps.len();
+    let readings = journal.readings();
+    let sets = readings.chunk_by(|a, b| (a.step < planned) == (b.step < planned));
+    let count = |set: &[&capture::Reading], sweep: Sweep| {
+        let of = |reading: &&&capture::Reading| reading.sweep == sweep && reading.accepted;
+        set.iter().filter(of).count()
+    };
+    sets.filter(|set| set[0].step >= planned)
+        .map(|set| (count(set, Sweep::Dark), count(set, Sweep::Reference)))
+        .collect()
+}
+
+/// Dark level and lamp drift while a run is held, however short; what follows must not rest on what was before.
+#[tokio::test(start_paused = true)]
+async fn whatever_held_a_run_it_goes_on_after_fresh_dark_and_reference_readings() {
+    for (rig, visits) in [("", 0), ("[calibration]\nlamp = \"visits\"", 1)] {
+        for command in [Command::Pause, Command::Finish, Command::Stop] {
+            let file = rig::RigFile::parse(rig, "test.toml".as_ref()).unwrap();
+            let mut scene = Scene::on(file, SHORT).await;
+            let dark = scene
+                .journal
+                .plan()
+                .steps
+                .iter()
+                .take_while(|step| !step.lamp)
+                .count();
+            let (control, mut hold) = (scene.control.clone(), after(35, &scene.control, command));
+            let outcome = scene.run(|event| {
+                if event == (Event::State { state: State::Paused }) {
+                    control.send_replace(Command::Run);
+                }
+                hold(event);
+            });
+            if outcome.await.unwrap() == Outcome::Stopped {
+                scene.control.send_replace(Command::Run);
+                assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+            }
+            assert_complete(&scene.journal);
+            assert_eq!(added(&scene.journal), [(dark, visits)], "{rig:?}, {command:?}");
+            scene.assert_safe();
+        }
+    }
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_run_that_is_held_before_any_light_takes_nothing_again() {
+    let mut scene = Scene::new(SHORT, "").await;
+    let stop = after(5, &scene.control, Command::Finish);
+    assert_eq!(scene.run(stop).await.unwrap(), Outcome::Stopped);
+    scene.control.send_replace(Command::Run);
+    assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+    assert_eq!(added(&scene.journal), []);
 }
 
 #[tokio::test(start_paused = true)]
