@@ -3,7 +3,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use ulid::Ulid;
 
-use crate::JobState;
+use crate::{JobState, VerdictView};
 
 /// Id of a job: a ULID, never reused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -69,6 +69,10 @@ pub struct Job {
     pub why: Option<String>,
     /// Its run, once it has begun.
     pub run: Option<String>,
+    /// What the checks say of that run's result, once it was reported. A job that is done may still be bad: everything
+    /// was measured, but the result must not be used.
+    #[serde(default)]
+    pub verdict: Option<VerdictView>,
     /// Who submitted it.
     pub by: String,
     /// When it was submitted, RFC 3339, UTC.

@@ -16,6 +16,7 @@ mod reading;
 mod rig;
 mod run;
 mod state;
+mod verdict;
 
 pub use acknowledgement::Acknowledgement;
 #[cfg(feature = "client")]
@@ -29,3 +30,4 @@ pub use reading::ReadingView;
 pub use rig::{Activity, ArmView, Progress, RigView};
 pub use run::RunView;
 pub use state::{Cause, JobState};
+pub use verdict::VerdictView;

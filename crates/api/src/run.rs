@@ -2,7 +2,7 @@ use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use crate::JobId;
+use crate::{JobId, VerdictView};
 
 /// A run.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -23,6 +23,8 @@ pub struct RunView {
     pub started: String,
     /// When its files were written last, RFC 3339, UTC; `None` before.
     pub reported: Option<String>,
+    /// What the checks said of its result when its files were written last; `None` before.
+    pub verdict: Option<VerdictView>,
     /// Steps of its plan.
     pub planned: u64,
     /// Steps with an accepted reading.

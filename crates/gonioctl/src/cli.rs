@@ -8,7 +8,8 @@ use clap_complete::Shell;
 /// Measures how a flat specimen reflects light, with two servo arms and a photometer.
 ///
 /// Data goes to stdout, talk to stderr. Exit codes: 0 done; 2 bad arguments, config or file; 3 rig fault or missing
-/// device; 4 stopped before the end, resumable, also a full disk; 5 the daemon cannot be reached, or refuses.
+/// device; 4 stopped before the end, resumable, also a full disk; 5 the daemon cannot be reached, or refuses; 6 measured,
+/// but not usable: no or unusable readings, or no reconstruction.
 #[derive(Debug, Parser)]
 #[command(name = "gonioctl", version, max_term_width = 100)]
 pub(crate) struct Cli {

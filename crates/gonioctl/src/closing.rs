@@ -6,6 +6,15 @@ use session::{Ended, Status};
 use crate::eval;
 use crate::progress::clock;
 
+/// The last line about a run whose result must not be used, by the names of the checks that are bad.
+pub(crate) fn not_usable<'a>(bad: impl IntoIterator<Item = &'a str>) -> String {
+    let bad: Vec<&str> = bad.into_iter().collect();
+    format!(
+        "measured, but not usable: bad is the check of {}",
+        bad.join(", of ")
+    )
+}
+
 /// A run that has ended, as its files tell it; whoever captured it, the words are the same.
 pub(crate) struct Closing {
     /// How the command ends.
@@ -43,6 +52,8 @@ impl Closing {
             "id": run["id"],
             "state": run["state"],
             "exit_status": self.status.code(),
+            "verdict": report["verdict"],
+            "findings": self.findings().collect::<Vec<_>>(),
             "fault": run["fault"],
             "directory": self.directory,
             "rig_seconds": run["seconds"]["total"],
@@ -55,11 +66,18 @@ impl Closing {
         })
     }
 
+    /// The checks that are not good, as report.json has them.
+    fn findings(&self) -> impl Iterator<Item = &Value> {
+        let checks = self.report["checks"].as_array().into_iter().flatten();
+        checks.filter(|check| check["verdict"] != "good")
+    }
+
     /// The summary for people.
     pub(crate) fn say(&self, wall_s: f64) {
         let Self { run, report, .. } = self;
         match self.status {
             Status::Done => terminal::say("done"),
+            Status::Unusable => terminal::say("every step was measured"),
             Status::Stopped => terminal::say("stopped; the readings so far are safe"),
             _ => terminal::say(format_args!(
                 "failed: {}",
@@ -89,8 +107,22 @@ impl Closing {
                 terminal::say(line);
             }
         }
-        if self.status != Status::Done {
-            terminal::say(format_args!("go on with: {}", self.again));
+        for check in self.findings() {
+            let [verdict, name, text] =
+                ["verdict", "name", "text"].map(|key| check[key].as_str().unwrap_or_default());
+            terminal::say(format_args!("{verdict:<9} {name}: {text}"));
+        }
+    }
+
+    /// The last line for people: what to do next, or why the result must not be used.
+    pub(crate) fn say_last(&self) {
+        match self.status {
+            Status::Done => {}
+            Status::Unusable => {
+                let bad = self.findings().filter(|check| check["verdict"] == "bad");
+                terminal::say(not_usable(bad.filter_map(|check| check["name"].as_str())));
+            }
+            _ => terminal::say(format_args!("go on with: {}", self.again)),
         }
     }
 }

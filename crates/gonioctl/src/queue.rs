@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use api::{Action, Client, Job, JobId, JobState};
+use api::{Action, Client, Job, JobId, JobState, VerdictView};
 
 use crate::error::CommandError;
 
@@ -129,6 +129,9 @@ fn advice(job: &Job) -> &'static str {
         JobState::AwaitingSpecimen => "; put the specimen on the stage, then `gonioctl ready`",
         JobState::Paused => "; `gonioctl resume` goes on",
         JobState::Interrupted => "; `gonioctl resume` goes on where it was",
+        JobState::Done if job.verdict == Some(VerdictView::Bad) => {
+            "; measured, but not usable: the report in its run directory says why"
+        }
         _ => "",
     }
 }

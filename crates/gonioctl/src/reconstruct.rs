@@ -7,8 +7,10 @@ use report::RunDirectory;
 use serde_json::Value;
 use session::Status;
 
+use crate::{closing, exit};
+
 /// Makes everything in a run directory again: from the daemon's store where that knows the run, else from the
-/// directory's own journal.
+/// directory's own journal. The exit code says whether the result can be used.
 ///
 /// # Errors
 /// No journal there, or a damaged one; a file that cannot be written; a store, and no daemon's program that could read it.
@@ -27,15 +29,27 @@ pub(crate) fn reconstruct(run: PathBuf, as_json: bool) -> anyhow::Result<ExitCod
         Some(Err(error)) => return Err(error),
         None => serde_json::to_value(report::reconstruct(&directory)?)?,
     };
+    let status = match report["verdict"] == "bad" {
+        true => Status::Unusable,
+        false => Status::Done,
+    };
     if as_json {
         terminal::json(&report)?;
-        return Ok(ExitCode::SUCCESS);
+        return Ok(exit::code(status));
     }
+    let mut bad = Vec::new();
     for check in report["checks"].as_array().into_iter().flatten() {
-        let text = |key: &str| check[key].as_str().unwrap_or_default();
-        terminal::line(format_args!("{}: {}", text("name"), text("text")))?;
+        let [verdict, name, text] =
+            ["verdict", "name", "text"].map(|key| check[key].as_str().unwrap_or_default());
+        terminal::line(format_args!("{verdict}: {name}: {text}"))?;
+        if verdict == "bad" {
+            bad.push(name);
+        }
     }
-    Ok(ExitCode::SUCCESS)
+    if status == Status::Unusable {
+        terminal::say(closing::not_usable(bad));
+    }
+    Ok(exit::code(status))
 }
 
 /// What the daemon's program made of its store.

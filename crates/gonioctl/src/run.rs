@@ -50,6 +50,7 @@ pub(crate) fn run(task: &Task<'_>, daemon: &DaemonArguments, json: bool) -> anyh
     } else {
         closing.say(wall_s);
         terminal::line(closing.directory.display())?;
+        closing.say_last();
     }
     Ok(exit::code(closing.status))
 }

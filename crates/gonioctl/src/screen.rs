@@ -1,7 +1,7 @@
 use std::time::{Duration, Instant};
 
 use api::client::{Message, ServerSentEvent};
-use api::{FaultView, Job, Progress, RigView, What};
+use api::{FaultView, Job, Progress, RigView, VerdictView, What};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use terminal::Printable;
@@ -10,6 +10,9 @@ use crate::progress::clock;
 
 /// Without a terminal, progress is printed at most so often.
 const LINE_EVERY: Duration = Duration::from_secs(5);
+
+/// What is added to the state of a job whose result must not be used.
+const NOT_USABLE: &str = ", measured but not usable: the report in its run directory says why";
 
 /// Shows what a daemon tells: on a terminal a bar with the rig's state, and lines above it for what is worth
 /// remembering; elsewhere lines; for machines every event as a line of JSON.
@@ -143,7 +146,11 @@ fn job_line(job: &Job) -> String {
         .as_ref()
         .map(|why| format!(" ({why})"))
         .unwrap_or_default();
-    format!("{} {}: {}{why}", job.id, job.specimen, job.state)
+    let verdict = match job.verdict {
+        Some(VerdictView::Bad) => NOT_USABLE,
+        _ => "",
+    };
+    format!("{} {}: {}{verdict}{why}", job.id, job.specimen, job.state)
 }
 
 fn fault_line(fault: &FaultView) -> String {
@@ -197,6 +204,15 @@ mod tests {
             "state": "awaiting_specimen", "why": null, "run": null, "by": "", "submitted": "", "changed": "",
         }});
         assert_eq!(told(job).unwrap(), format!("{id} gold: awaiting specimen"));
+        let bad = json!({"event": "job", "job": {
+            "id": id, "place": 1, "name": "gold.toml", "specimen": "gold", "on_stage": false, "text": "",
+            "state": "done", "verdict": "bad", "why": null, "run": "01", "by": "", "submitted": "", "changed": "",
+        }});
+        let bad = told(bad).unwrap();
+        assert!(
+            bad.starts_with(&format!("{id} gold: done, measured but not usable")),
+            "{bad}"
+        );
         let fault = json!({"code": "no_reply", "text": "light servo is silent", "at": "", "run": null});
         assert!(
             told(json!({"event": "fault", "fault": fault}))

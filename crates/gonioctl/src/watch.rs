@@ -2,7 +2,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 use api::client::{Message, Stream};
-use api::{Client, ClientError, FaultCode, Job, JobId, JobState, What};
+use api::{Client, ClientError, FaultCode, Job, JobId, JobState, VerdictView, What};
 use session::Status;
 
 use crate::exit;
@@ -110,6 +110,7 @@ impl<'a> Watcher<'a> {
     /// How the command ends when its job has.
     fn status(&self, job: &Job) -> Result<Status, ClientError> {
         Ok(match job.state {
+            JobState::Done if job.verdict == Some(VerdictView::Bad) => Status::Unusable,
             JobState::Done => Status::Done,
             JobState::Failed => Status::Invalid,
             JobState::Interrupted => match self.daemon.rig()?.fault.map(|fault| fault.code) {

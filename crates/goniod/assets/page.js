@@ -16,6 +16,8 @@ const WORDS = {
 };
 const MOODS = { running: "good", reporting: "good", warming_up: "good", engaging: "good", identifying: "good", done: "good",
   paused: "look", awaiting_specimen: "look", stopping: "look", interrupted: "look", failed: "bad" };
+// What is worth saying of a run's result; its report says why.
+const VERDICTS = { look: "look at its checks", bad: "not usable" };
 const OVER = ["done", "failed", "cancelled"];
 
 const drawing = new Drawing($("drawing"));
@@ -68,6 +70,7 @@ const node = (name, properties = {}, ...children) => {
   return made;
 };
 const chip = (state) => node("span", { className: `chip ${MOODS[state] ?? ""}` }, WORDS[state] ?? state);
+const verdict = (run) => node("span", { className: `chip ${run.verdict}` }, VERDICTS[run.verdict]);
 const degrees = (deg) => Number.isFinite(deg) ? `${deg.toFixed(2)}°` : "–";
 const clock = (seconds) => {
   const s = Math.max(0, Math.round(seconds));
@@ -172,11 +175,12 @@ function showJobs() {
 function showRuns() {
   replace($("run-list"), runs.map((run) => {
     const state = jobs.get(run.job)?.state ?? "–";
+    const judged = VERDICTS[run.verdict] ? [" ", verdict(run)] : [];
     const report = run.reported ? node("a", { href: `#run/${run.id}` }, "open",
       node("span", { className: "unseen" }, ` the report of ${title(run)}`)) : "not yet";
     const taken = node("td", {}, `${run.accepted} of ${run.planned}`);
     taken.dataset.run = run.id;
-    return node("tr", {}, node("td", {}, title(run)), node("td", {}, chip(state)), node("td", {}, when(run.started)),
+    return node("tr", {}, node("td", {}, title(run)), node("td", {}, chip(state), ...judged), node("td", {}, when(run.started)),
       taken, node("td", {}, report));
   }));
 }
@@ -226,7 +230,8 @@ const HAPPENINGS = {
   job: ({ job, at }) => {
     const before = jobs.get(job.id)?.state;
     jobs.set(job.id, job);
-    if (before !== job.state) log(at, `${title(job)}: ${WORDS[job.state]}${job.why ? ` (${job.why})` : ""}`);
+    const why = job.why ?? (job.verdict === "bad" && job.state === "done" ? "measured, but not usable: its report says why" : "");
+    if (before !== job.state) log(at, `${title(job)}: ${WORDS[job.state]}${why ? ` (${why})` : ""}`);
     showJobs();
     if (rig) showNow();
     if (job.run) loadRuns();
@@ -299,7 +304,8 @@ async function route() {
     const run = await ask("GET", `/runs/${id}`);
     const at = `${API}/runs/${id}/files`;
     $("report-title").textContent = title(run);
-    $("report-facts").textContent = `Run ${run.id}, begun ${when(run.started)}, ${run.accepted} of ${run.planned} readings.`;
+    $("report-facts").textContent = `Run ${run.id}, begun ${when(run.started)}, ${run.accepted} of ${run.planned} readings.`
+      + (run.verdict === "bad" ? " Measured, but not usable: the checks below say why." : "");
     $("report-frame").src = $("report-alone").href = `${at}/report.html`;
     const files = await ask("GET", `/runs/${id}/files`);
     $("files").replaceChildren(...files.map(({ name, bytes }) =>

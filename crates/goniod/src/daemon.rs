@@ -361,10 +361,14 @@ impl Daemon {
     pub async fn rebuild(&self, id: &str) -> Result<RunView, Refusal> {
         let directory = RunDirectory::at(self.run(id).await?.directory);
         let records = self.records(id).await?;
-        blocking(move || write(&directory, &records))
+        let report = blocking(move || write(&directory, &records))
             .await?
             .map_err(|error| Refusal::unavailable(chain(&error)))?;
-        self.shared.store.reported(id, &self.shared.now()).await?;
+        let verdict = crate::view::verdict(report.verdict);
+        self.shared
+            .store
+            .reported(id, &self.shared.now(), verdict)
+            .await?;
         self.run(id).await
     }
 

@@ -23,7 +23,7 @@ mod worker;
 
 pub use api::{
     Action, Activity, ArmView, Event, FaultCode, FaultId, FaultView, Job, JobId, JobState, LeftOutView,
-    LightView, PlanView, Progress, ReadingView, RigView, RunView, SweepView, What,
+    LightView, PlanView, Progress, ReadingView, RigView, RunView, SweepView, VerdictView, What,
 };
 pub use caller::{Caller, Submission};
 pub use daemon::{Daemon, Settings};

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use async_trait::async_trait;
 use capture::Record;
 
-use crate::{FaultCode, FaultView, Job, JobId, RunView};
+use crate::{FaultCode, FaultView, Job, JobId, RunView, VerdictView};
 
 mod journal;
 mod memory;
@@ -59,11 +59,11 @@ pub trait Store: Send + Sync + 'static {
     /// The medium refused.
     async fn begin_run(&self, run: &RunView, header: &Record) -> Result<(), StoreError>;
 
-    /// Notes when a run's files were written.
+    /// Notes when a run's files were written, and what its checks said.
     ///
     /// # Errors
     /// The medium refused.
-    async fn reported(&self, run: &str, at: &str) -> Result<(), StoreError>;
+    async fn reported(&self, run: &str, at: &str, verdict: VerdictView) -> Result<(), StoreError>;
 
     /// The latest so many runs, newest first.
     ///

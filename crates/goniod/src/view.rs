@@ -1,8 +1,11 @@
 //! How what goes over HTTP is made of what the rig, the capture and the report say.
 
-use api::{Activity, ArmView, FaultCode, LeftOutView, LightView, PlanView, ReadingView, RigView, SweepView};
+use api::{
+    Activity, ArmView, FaultCode, LeftOutView, LightView, PlanView, ReadingView, RigView, SweepView,
+    VerdictView,
+};
 use arms::Arm;
-use report::Measurement;
+use report::{Measurement, Verdict};
 use rig::{FaultKind, RigFile, Snapshot};
 use sweep::{Light, Plan};
 
@@ -134,5 +137,15 @@ pub(crate) fn reading(measurement: &Measurement) -> ReadingView {
             .map(|&flag| report::flag_name(flag).to_owned())
             .collect(),
         time_s: measurement.time_s,
+    }
+}
+
+/// What the checks say of a run's result.
+pub(crate) fn verdict(verdict: Verdict) -> VerdictView {
+    match verdict {
+        Verdict::Unknown => VerdictView::Unknown,
+        Verdict::Good => VerdictView::Good,
+        Verdict::Look => VerdictView::Look,
+        Verdict::Bad => VerdictView::Bad,
     }
 }

@@ -30,10 +30,9 @@ pub trait Model: Brdf {
 pub enum Basis {
     /// Both factors were read around it.
     Interpolated,
-    /// It lies beyond the range of a factor.
+    /// It lies beyond the range of a factor, or in a gap that the readings leave about retro-reflection. Why nothing was
+    /// read there a model cannot know.
     Extrapolated,
-    /// The arms hide each other there, so that nobody could have read it: near retro-reflection, and near the normal.
-    Occluded,
     /// It lies outside of what the job's scene asks for, so that nothing was read for it.
     NotMeasured,
 }

@@ -169,12 +169,11 @@ impl Brdf for Separable {
 impl Model for Separable {
     fn basis(&self, incident: DVec3, exitant: DVec3) -> Basis {
         let [sin_o, d_p] = squares(incident, exitant);
-        if sin_o < self.f.range().0 - ROUNDING || self.in_hole(d_p) {
-            Basis::Occluded
-        } else if self.f.extrapolated(sin_o) || self.g.extrapolated(d_p) {
-            Basis::Extrapolated
-        } else {
-            Basis::Interpolated
+        let below = sin_o < self.f.range().0 - ROUNDING;
+        let gap = below || self.in_hole(d_p);
+        match gap || self.f.extrapolated(sin_o) || self.g.extrapolated(d_p) {
+            true => Basis::Extrapolated,
+            false => Basis::Interpolated,
         }
     }
 

@@ -23,8 +23,8 @@ pub(crate) struct Surface {
     pub(crate) f: Factor,
     /// G over θ_h and θ_d.
     pub(crate) lobe: Lobe,
-    /// The smallest θ_d, rad, that was read: closer to retro-reflection the arms hide each other.
-    hidden: f64,
+    /// The smallest θ_d, rad, that was read: nothing is known closer to retro-reflection.
+    closest: f64,
 }
 
 impl Surface {
@@ -53,7 +53,7 @@ impl Surface {
             excess,
             f,
             lobe: g,
-            hidden: sweeps.points().map(|p| p.theta_d).fold(f64::INFINITY, f64::min),
+            closest: sweeps.points().map(|p| p.theta_d).fold(f64::INFINITY, f64::min),
         })
     }
 
@@ -107,12 +107,10 @@ impl Surface {
 
     /// What a pair in the plane rests on.
     pub(crate) fn basis(&self, pose: Bisected) -> Basis {
-        if pose.theta_d < self.hidden - ROUNDING {
-            Basis::Occluded
-        } else if !self.lobe.covers(pose.theta_h) || self.f.extrapolated(pose.theta_d) {
-            Basis::Extrapolated
-        } else {
-            Basis::Interpolated
+        let closer = pose.theta_d < self.closest - ROUNDING;
+        match closer || !self.lobe.covers(pose.theta_h) || self.f.extrapolated(pose.theta_d) {
+            true => Basis::Extrapolated,
+            false => Basis::Interpolated,
         }
     }
 

@@ -357,7 +357,7 @@ fn says_what_it_has_not_measured() {
 }
 
 #[test]
-fn tells_what_the_arms_hide_from_what_lies_beyond() {
+fn what_lies_beyond_the_readings_or_in_a_gap_between_them_is_extrapolated() {
     let gold = fitted("gold-paint");
     let planes: Vec<_> = [20.0, 60.0].map(|deg| plane(&gold, deg, 30)).into();
     let along = arc(&gold, 30, 0.0);
@@ -371,7 +371,7 @@ fn tells_what_the_arms_hide_from_what_lies_beyond() {
             model.basis(incident, exitant)
         };
         assert_eq!(basis(0.5, 0.9, 2.0), Basis::Interpolated, "{}", model.about());
-        assert_eq!(basis(0.5, 0.51, 0.0), Basis::Occluded, "{}", model.about());
+        assert_eq!(basis(0.5, 0.51, 0.0), Basis::Extrapolated, "{}", model.about());
         assert_eq!(basis(1.5, 1.5, PI), Basis::Extrapolated, "{}", model.about());
     }
 }

@@ -1,18 +1,41 @@
-use brdf::{Brdf, Spherical};
 use glam::DVec3;
-use pdv::{Basis, Model, Observation, albedo};
+use pdv::{Model, Observation};
 use serde_json::json;
 
 use crate::{Check, Readings, Run, Verdict};
+
+mod coverage;
+mod energy;
+mod reflectance;
+
+pub(crate) use coverage::coverage;
+pub(crate) use energy::energy;
+pub(crate) use reflectance::reflectance;
 
 /// Two readings of one pose may differ by so much before somebody should look: the repeatability of a good rig.
 const REPEAT_LIMIT: f64 = 0.03;
 /// The two sides of a lobe may differ by so much: beyond it the assumption of the model costs more than the rig does.
 const SIDES_LIMIT: f64 = 0.10;
-/// So much may be extrapolated: a plane at 70° with ordinary limits leaves less out.
-const COVERAGE_LIMIT: f64 = 0.10;
-/// Directions at which the albedo is checked, degrees.
-const ALBEDO_DEG: [f64; 4] = [0.0, 30.0, 60.0, 75.0];
+
+/// Whether there is a reconstruction: without one a complete run has no result.
+pub(crate) fn reconstruction(model: Option<&dyn Model>, no_model: Option<&str>, complete: bool) -> Check {
+    let (verdict, text) = match (model, no_model) {
+        (Some(model), _) => (Verdict::Good, format!("The reconstruction is {}.", model.about())),
+        (None, why) => (
+            if complete { Verdict::Bad } else { Verdict::Unknown },
+            format!(
+                "There is no reconstruction: {}.",
+                why.unwrap_or("nobody knows why")
+            ),
+        ),
+    };
+    Check {
+        name: "reconstruction",
+        verdict,
+        text,
+        values: json!({ "model": model.map(|model| model.about()), "no_model": no_model }),
+    }
+}
 
 /// The plane and the arc cross at one pose, which was therefore measured twice: G(x) against the arc.
 pub(crate) fn crossing(plane: &[Observation], arc: &[Observation], theta_r: f64, offset: f64) -> Check {
@@ -92,8 +115,8 @@ pub(crate) fn helmholtz(first: (&[Observation], f64), second: (&[Observation], f
     }
 }
 
-/// The two sides of a plane at the same d_p: what the model takes to be equal.
-pub(crate) fn sides(plane: &[Observation], theta_r: f64) -> Check {
+/// The two sides of a plane at the same d_p: what a model that is constant along φ_p takes to be equal.
+pub(crate) fn sides(plane: &[Observation], theta_r: f64, taken_as_equal: bool) -> Check {
     let name = "both sides of the mirror direction";
     let side = |sign: f64| -> Vec<(f64, DVec3)> {
         let on_side = plane.iter().filter(|o| o.deviation * sign > 0.0);
@@ -122,11 +145,19 @@ pub(crate) fn sides(plane: &[Observation], theta_r: f64) -> Check {
     };
     Check {
         name,
-        verdict: limit(median, SIDES_LIMIT),
+        verdict: match taken_as_equal {
+            true => limit(median, SIDES_LIMIT),
+            false => Verdict::Good,
+        },
         text: format!(
-            "At {degrees:.0}° the two sides of the mirror direction differ by {:.1} % in the median over {} readings; the model takes them to be equal.",
+            "At {degrees:.0}° the two sides of the mirror direction differ by {:.1} % in the median over {} readings; the model {}.",
             100.0 * median.exp_m1(),
-            differences.len()
+            differences.len(),
+            if taken_as_equal {
+                "takes them to be equal"
+            } else {
+                "has each of them for itself"
+            }
         ),
         values: json!({ "theta_r_deg": degrees, "median_log_ratio": median, "readings": differences.len() }),
     }
@@ -159,77 +190,6 @@ pub(crate) fn bus(run: &Run) -> Check {
     }
 }
 
-/// Nothing reflects more than it receives: directional albedo at a few angles, over so many azimuths about the mirror
-/// direction; 1 is enough for a model that is constant along them.
-pub(crate) fn energy(model: &dyn Brdf, azimuths: usize) -> Check {
-    let albedos: Vec<(f64, DVec3)> = ALBEDO_DEG
-        .map(|deg| (deg, albedo(model, deg.to_radians(), azimuths)))
-        .into();
-    let worst = albedos.iter().map(|(_, a)| a.max_element()).fold(0.0, f64::max);
-    Check {
-        name: "energy",
-        verdict: if worst <= 1.0 {
-            Verdict::Good
-        } else {
-            Verdict::Look
-        },
-        text: format!(
-            "The directional albedo is at most {worst:.3} at {}°; above 1 the specimen would give off more light than it gets.",
-            ALBEDO_DEG.map(|deg| deg.to_string()).join(", ")
-        ),
-        values: json!(
-            albedos
-                .iter()
-                .map(|(deg, a)| json!({ "theta_deg": deg, "rgb": a.to_array() }))
-                .collect::<Vec<_>>()
-        ),
-    }
-}
-
-/// How much of the BRDF rests on nothing that was measured, over pairs below 80°, even in angle, that the job asks for.
-pub(crate) fn coverage(model: &dyn Model) -> Check {
-    let zenith = || (0..80).step_by(4).map(|deg| f64::from(deg + 2).to_radians());
-    let azimuth = || (0..180).step_by(10).map(|deg| f64::from(deg + 5).to_radians());
-    let (mut pairs, mut beyond, mut hidden, mut outside) = (0_u32, 0_u32, 0_u32, 0_u32);
-    for (theta_i, theta_o) in zenith().flat_map(|i| zenith().map(move |o| (i, o))) {
-        let exitant = Spherical {
-            theta: theta_o,
-            phi: 0.0,
-        }
-        .direction();
-        for phi in azimuth() {
-            let incident = Spherical { theta: theta_i, phi }.direction();
-            let basis = model.basis(incident, exitant);
-            if basis == Basis::NotMeasured {
-                outside += 1;
-                continue;
-            }
-            pairs += 1;
-            beyond += u32::from(basis == Basis::Extrapolated);
-            hidden += u32::from(basis == Basis::Occluded);
-        }
-    }
-    let [share, occluded] = [beyond, hidden].map(|count| f64::from(count) / f64::from(pairs.max(1)));
-    let not_measured = f64::from(outside) / f64::from(pairs + outside);
-    let of_scene = match outside {
-        0 => String::new(),
-        _ => format!(
-            " The scene leaves {:.1} % out, which are not measured and not counted here.",
-            100.0 * not_measured
-        ),
-    };
-    Check {
-        name: "coverage",
-        verdict: limit(share + occluded, COVERAGE_LIMIT),
-        text: format!(
-            "{:.1} % of all pairs of directions below 80° lie beyond the range that was measured and are extrapolated, {:.1} % where the arms hide each other.{of_scene}",
-            100.0 * share,
-            100.0 * occluded
-        ),
-        values: json!({ "extrapolated": share, "occluded": occluded, "not_measured": not_measured }),
-    }
-}
-
 fn limit(value: f64, limit: f64) -> Verdict {
     if value <= limit {
         Verdict::Good
@@ -254,22 +214,7 @@ fn between(mut points: Vec<(f64, DVec3)>, x: f64) -> Option<DVec3> {
 
 #[cfg(test)]
 mod tests {
-    use std::f64::consts::PI;
-
     use super::*;
-
-    #[test]
-    fn more_light_out_than_in_is_noticed() {
-        let verdict = |albedo| energy(&brdf::Lambert::new(albedo).unwrap(), 1).verdict;
-        assert_eq!(verdict(0.9), Verdict::Good);
-        struct Bright;
-        impl Brdf for Bright {
-            fn eval(&self, _: DVec3, _: DVec3) -> DVec3 {
-                DVec3::splat(1.2 / PI)
-            }
-        }
-        assert_eq!(energy(&Bright, 1).verdict, Verdict::Look);
-    }
 
     #[test]
     fn light_and_sensor_may_be_swapped_in_a_reciprocal_specimen_only() {

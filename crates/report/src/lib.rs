@@ -37,7 +37,7 @@ pub use page::escape;
 pub use picture::Picture;
 pub use preview::{EXPOSURE as SPHERE_EXPOSURE, sphere};
 pub use readings::write_readings;
-pub use report::{Report, reconstruct, write};
+pub use report::{Report, judge, reconstruct, write};
 pub use run::{Given, Readings, Run, Seconds, State, Used, flag_name};
 pub use standard::{Standard, WhiteReference};
 pub use uncertainty::COVERAGE;

@@ -5,7 +5,7 @@ use sweep::Job;
 use crate::derive::Sweeps;
 use crate::page::Page;
 use crate::run::State;
-use crate::{MonteCarlo, Report, figures, preview};
+use crate::{MonteCarlo, Report, Verdict, figures, preview};
 
 /// What report.html shows of a run.
 pub(crate) fn page<'a>(
@@ -89,8 +89,15 @@ fn facts(report: &Report) -> Vec<(&'static str, String)> {
             )
         })
         .collect();
+    let verdict = match report.verdict {
+        Verdict::Good => "good: no check found anything",
+        Verdict::Look => "look: a check below found something that is worth a look",
+        Verdict::Bad => "bad: measured, but not usable; the checks below say why",
+        Verdict::Unknown => "not judged: the run is not complete",
+    };
     let mut facts = vec![
         ("State", state),
+        ("Verdict", verdict.to_owned()),
         ("Run", run.id.clone()),
         ("Began", run.started.clone()),
         (
@@ -120,17 +127,7 @@ fn facts(report: &Report) -> Vec<(&'static str, String)> {
 }
 
 fn notes(report: &Report) -> Vec<String> {
-    let mut notes: Vec<String> = report
-        .no_model
-        .iter()
-        .map(|why| format!("There is no reconstruction: {why}."))
-        .collect();
-    notes.extend(
-        report
-            .model
-            .iter()
-            .map(|about| format!("The reconstruction is {about}.")),
-    );
+    let mut notes = Vec::new();
     if let Some(adapted) = &report.adapted {
         notes.extend(
             adapted

@@ -52,10 +52,10 @@ impl Page<'_> {
             name, verdict, text, ..
         } in self.checks
         {
-            let (class, word) = match verdict {
-                Verdict::Good => ("good", "good"),
-                Verdict::Look => ("look", "look"),
-                Verdict::Unknown => ("unknown", "not checked"),
+            let class = verdict.word();
+            let word = match verdict {
+                Verdict::Unknown => "not checked",
+                judged => judged.word(),
             };
             push(
                 &mut body,

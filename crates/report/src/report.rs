@@ -1,7 +1,7 @@
 use std::io::{self, Write};
 
 use brdf::{Brdf, MerlTable};
-use capture::{FileJournal, Record};
+use capture::{FileJournal, Header, Record};
 use glam::{BVec3, DVec3};
 use pdv::{Comparison, Draw, Model, Scene, compare_within};
 use rig::RigFile;
@@ -10,8 +10,8 @@ use sweep::{Job, LeftOut};
 
 use crate::derive::{Sweeps, truth};
 use crate::{
-    Adapted, Check, MonteCarlo, Pace, ReportError, Run, RunDirectory, checks, measurements, outline, preview,
-    slice, write_readings,
+    Adapted, Check, Measurement, MonteCarlo, Pace, ReportError, Run, RunDirectory, Verdict, checks,
+    measurements, outline, preview, slice, write_readings,
 };
 
 /// Azimuths at which the albedo of a model that is not constant along φ_p is taken.
@@ -25,6 +25,8 @@ pub struct Report {
     /// What was done; run.json says it in full.
     #[serde(skip)]
     pub run: Run,
+    /// What the checks say of the result as a whole.
+    pub verdict: Verdict,
     /// Consistency checks.
     pub checks: Vec<Check>,
     /// Errors against the truth, where the built-in simulator knows it.
@@ -60,25 +62,20 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
             path: directory.journal(),
         });
     };
-    let job = Job::parse(&header.job, "job file").map_err(ReportError::Job)?;
-    let job = capture::extended_plan(records).map_or(job.clone(), |plan| job.grown(&plan));
-    let rig = RigFile::parse(&header.rig, "rig file".as_ref()).map_err(ReportError::Rig)?;
-    let run = Run::new(header, records);
-    let measurements = measurements(records, &rig);
+    let Examined {
+        job,
+        rig,
+        run,
+        measurements,
+        sweeps,
+        model,
+        no_model,
+        checks,
+    } = Examined::new(header, records)?;
     directory.write("run.json", |file| json(file, &run))?;
     directory.write("readings.csv", |file| write_readings(&measurements, file))?;
 
-    let sweeps = Sweeps::new(&job, &measurements);
-    let model = if run.complete() {
-        sweeps.model(&job).map_err(|error| error.to_string())
-    } else {
-        Err("the run is not complete".to_owned())
-    };
     let truth = truth(&rig);
-    let (model, no_model) = match model {
-        Ok(model) => (Some(model), None),
-        Err(why) => (None, Some(why)),
-    };
     let draws = model
         .as_ref()
         .map(|_| MonteCarlo::new(&job, &measurements, records, &rig));
@@ -92,7 +89,8 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
     });
     let report = Report {
         specimen: job.specimen.clone(),
-        checks: check(&run, &job, &sweeps, model.as_deref()),
+        verdict: run.verdict,
+        checks,
         errors,
         adapted: Adapted::new(records),
         no_model,
@@ -112,6 +110,70 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
     );
     directory.write("report.html", |file| file.write_all(page.html().as_bytes()))?;
     Ok(report)
+}
+
+/// The checks of a run and what they say as a whole, by its journal alone; nothing is written.
+///
+/// # Errors
+/// Records without a header, whose file is called the journal then; a job or rig file that this version does not accept.
+pub fn judge(records: &[Record]) -> Result<(Verdict, Vec<Check>), ReportError> {
+    let Some(Record::Header(header)) = records.first() else {
+        return Err(ReportError::NoHeader {
+            path: "the journal".into(),
+        });
+    };
+    let examined = Examined::new(header, records)?;
+    Ok((examined.run.verdict, examined.checks))
+}
+
+/// A run with all that follows from its journal before anything is written.
+struct Examined {
+    job: Job,
+    rig: RigFile,
+    run: Run,
+    measurements: Vec<Measurement>,
+    sweeps: Sweeps,
+    model: Option<Box<dyn Model>>,
+    no_model: Option<String>,
+    checks: Vec<Check>,
+}
+
+impl Examined {
+    fn new(header: &Header, records: &[Record]) -> Result<Self, ReportError> {
+        let job = Job::parse(&header.job, "job file").map_err(ReportError::Job)?;
+        let job = capture::extended_plan(records).map_or(job.clone(), |plan| job.grown(&plan));
+        let rig = RigFile::parse(&header.rig, "rig file".as_ref()).map_err(ReportError::Rig)?;
+        let mut run = Run::new(header, records);
+        let measurements = measurements(records, &rig);
+        let sweeps = Sweeps::new(&job, &measurements);
+        let model = match run.complete() {
+            true => sweeps.model(&job).map_err(|error| error.to_string()),
+            false => Err("the run is not complete".to_owned()),
+        };
+        let (model, no_model) = match model {
+            Ok(model) => (Some(model), None),
+            Err(why) => (None, Some(why)),
+        };
+        let mut checks = vec![
+            checks::reconstruction(model.as_deref(), no_model.as_deref(), run.complete()),
+            checks::reflectance(&measurements, &job),
+        ];
+        checks.extend(check(&run, &job, &sweeps));
+        if let Some(model) = &model {
+            checks.extend(check_model(model.as_ref(), &job, &sweeps, &rig));
+        }
+        run.judge(Verdict::overall(&checks, run.complete()));
+        Ok(Self {
+            job,
+            rig,
+            run,
+            measurements,
+            sweeps,
+            model,
+            no_model,
+            checks,
+        })
+    }
 }
 
 /// factors.csv, brdf.binary and its uncertainty, slice.exr, preview.exr and preview.png.
@@ -170,18 +232,14 @@ fn write_factors(model: &dyn Model, draws: &MonteCarlo, out: impl Write) -> io::
     writer.flush()
 }
 
-fn check(run: &Run, job: &Job, sweeps: &Sweeps, model: Option<&dyn Model>) -> Vec<Check> {
+/// What the readings say of the measurement, whatever is made of them.
+fn check(run: &Run, job: &Job, sweeps: &Sweeps) -> Vec<Check> {
     let mut checks = vec![checks::bus(run)];
-    for (plane, observations) in job.planes.iter().zip(&sweeps.planes) {
-        if let Some(arc) = &job.arc {
-            checks.push(checks::crossing(
-                observations,
-                &sweeps.arc,
-                plane.theta_r,
-                arc.offset,
-            ));
-        }
-        checks.push(checks::sides(observations, plane.theta_r));
+    if let Some(arc) = &job.arc {
+        let planes = job.planes.iter().zip(&sweeps.planes);
+        checks.extend(planes.map(|(plane, observations)| {
+            checks::crossing(observations, &sweeps.arc, plane.theta_r, arc.offset)
+        }));
     }
     let planes: Vec<_> = job
         .planes
@@ -189,15 +247,24 @@ fn check(run: &Run, job: &Job, sweeps: &Sweeps, model: Option<&dyn Model>) -> Ve
         .zip(&sweeps.planes)
         .map(|(plane, observations)| (observations.as_slice(), plane.theta_r))
         .collect();
-    for pair in planes.windows(2) {
-        checks.push(checks::helmholtz(pair[0], pair[1]));
-    }
-    if let Some(model) = model {
-        checks.push(checks::coverage(model));
-        checks.push(checks::energy(
-            model,
-            if model.phi_p_constant() { 1 } else { AZIMUTHS },
-        ));
+    checks.extend(planes.windows(2).map(|pair| checks::helmholtz(pair[0], pair[1])));
+    checks
+}
+
+/// What is to be said of a model. Who names another one than the usual on purpose knows what it takes for granted, and is
+/// told at worst to look: its readings may be perfectly good.
+fn check_model(model: &dyn Model, job: &Job, sweeps: &Sweeps, rig: &RigFile) -> Vec<Check> {
+    let azimuths = if model.phi_p_constant() { 1 } else { AZIMUTHS };
+    let sides = job.planes.iter().zip(&sweeps.planes);
+    let mut checks: Vec<Check> = sides
+        .map(|(plane, observations)| checks::sides(observations, plane.theta_r, model.phi_p_constant()))
+        .collect();
+    checks.push(checks::coverage(model, &rig.envelope, job.arc.is_some()));
+    checks.push(checks::energy(model, job.scene.as_ref(), azimuths));
+    if job.model != sweep::Model::default() {
+        for check in &mut checks {
+            check.verdict = check.verdict.min(Verdict::Look);
+        }
     }
     checks
 }

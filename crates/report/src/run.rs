@@ -5,6 +5,8 @@ use rig::{Certificate, Conditions, Identity};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use crate::Verdict;
+
 /// Seconds per tick of the photometer's clock.
 pub(crate) const TICK_S: f64 = 1e-5;
 
@@ -23,9 +25,10 @@ pub enum State {
 }
 
 impl State {
-    /// Exit status of the command that ran it; `None` while there is none.
-    pub fn exit_status(self) -> Option<u8> {
+    /// Exit status of the command that ran it, by what the checks say of its result; `None` while there is none.
+    pub fn exit_status(self, verdict: Verdict) -> Option<u8> {
         match self {
+            Self::Done if verdict == Verdict::Bad => Some(6),
             Self::Done => Some(0),
             Self::Failed => Some(3),
             Self::Stopped => Some(4),
@@ -84,6 +87,8 @@ pub struct Run {
     pub id: String,
     /// How it stands.
     pub state: State,
+    /// What the checks say of its result as a whole.
+    pub verdict: Verdict,
     /// Exit status of the command that ran it last.
     pub exit_status: Option<u8>,
     /// The fault in words, where one ended it.
@@ -208,8 +213,14 @@ impl Run {
             }
         }
         run.closed = capture::closed(records);
-        run.exit_status = run.state.exit_status();
+        run.exit_status = run.state.exit_status(run.verdict);
         run
+    }
+
+    /// Notes what the checks say of the result as a whole.
+    pub(crate) fn judge(&mut self, verdict: Verdict) {
+        self.verdict = verdict;
+        self.exit_status = self.state.exit_status(verdict);
     }
 
     /// Whether every step of the plan has an accepted reading, and no more can be added.
@@ -221,6 +232,7 @@ impl Run {
         Self {
             id: header.run.clone(),
             state: State::Interrupted,
+            verdict: Verdict::Unknown,
             exit_status: None,
             fault: None,
             version: header.version.clone(),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use capture::{Command, Event, Extension, FileJournal, Journal, Outcome, Record, Thinking};
-use report::{Report, RunDirectory};
+use report::{Report, RunDirectory, Verdict};
 use rig::RigFile;
 use sweep::Job;
 use tokio::sync::watch;
@@ -23,9 +23,12 @@ pub struct Ended {
 }
 
 impl Ended {
-    /// The exit status.
+    /// The exit status: that of the capture, and of a capture that was carried out whether its result can be used.
     pub fn status(&self) -> Status {
-        Status::from(&self.outcome)
+        match (Status::from(&self.outcome), self.report.verdict) {
+            (Status::Done, Verdict::Bad) => Status::Unusable,
+            (status, _) => status,
+        }
     }
 }
 

@@ -14,6 +14,8 @@ pub enum Status {
     Stopped = 4,
     /// The daemon cannot be reached, or refuses.
     Daemon = 5,
+    /// Everything was measured, but the result must not be used: there is no reconstruction, or a check is bad.
+    Unusable = 6,
 }
 
 impl Status {

@@ -2,12 +2,14 @@ use capture::Command;
 
 use super::Queue;
 use crate::operator::Signal;
-use api::Cause;
+use api::{Cause, VerdictView};
 
 /// What the rig's worker tells the queue.
 pub(crate) enum WorkerEvent {
     /// The job under way has a run.
     Begun { run: String },
+    /// The files of the run under way were written, and its checks judged it.
+    Reported { verdict: VerdictView },
     /// The job under way ended.
     Ended(Ending),
     /// A motion by hand ended, or was refused.
@@ -45,6 +47,11 @@ impl Queue {
                 self.shared.view.send_modify(|view| view.run = Some(run.clone()));
                 if let Some(job) = self.jobs.iter_mut().find(|job| Some(job.id) == self.current) {
                     job.run = Some(run);
+                }
+            }
+            WorkerEvent::Reported { verdict } => {
+                if let Some(job) = self.jobs.iter_mut().find(|job| Some(job.id) == self.current) {
+                    job.verdict = Some(verdict);
                 }
             }
             WorkerEvent::Ended(ending) => self.end_job(ending).await,

@@ -74,6 +74,7 @@ impl Queue {
             state: JobState::Queued,
             why: None,
             run: None,
+            verdict: None,
             by: by.to_owned(),
             submitted: now.clone(),
             changed: now,

@@ -6,7 +6,7 @@ use capture::Record;
 use tokio::sync::watch;
 
 use super::{Store, StoreError};
-use crate::{FaultView, Job, JobId, RunView};
+use crate::{FaultView, Job, JobId, RunView, VerdictView};
 
 /// A store that is gone with the program. It can be paused, slowed down, and made to fail, at every call.
 ///
@@ -166,10 +166,15 @@ impl Store for Memory {
         .await
     }
 
-    async fn reported(&self, run: &str, at: &str) -> Result<(), StoreError> {
+    async fn reported(&self, run: &str, at: &str, verdict: VerdictView) -> Result<(), StoreError> {
         self.call("note a report", |kept| {
             if let Some(run) = kept.runs.iter_mut().find(|known| known.id == run) {
                 run.reported = Some(at.to_owned());
+                run.verdict = Some(verdict);
+            }
+            let of_run = |job: &&mut Job| job.run.as_deref() == Some(run);
+            if let Some(job) = kept.jobs.values_mut().find(of_run) {
+                job.verdict = Some(verdict);
             }
             Ok(())
         })

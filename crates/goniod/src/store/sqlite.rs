@@ -11,7 +11,7 @@ use sqlx::sqlite::{
 };
 
 use super::{Store, StoreError};
-use crate::{FaultId, FaultView, Job, JobId, RunView};
+use crate::{FaultId, FaultView, Job, JobId, RunView, VerdictView};
 
 mod row;
 #[cfg(test)]
@@ -24,6 +24,10 @@ const BUSY: Duration = Duration::from_secs(2);
 /// Columns of a run, with what its journal says of it.
 const RUN: &str = "SELECT runs.*, jobs.name, jobs.specimen, (SELECT COUNT(*) FROM records WHERE records.run = runs.id \
                    AND records.accepted = 1) AS accepted FROM runs JOIN jobs ON jobs.id = runs.job";
+
+/// Columns of a job, with what its run came to.
+const JOB: &str =
+    "SELECT jobs.*, (SELECT verdict FROM runs WHERE runs.id = jobs.run) AS verdict FROM jobs WHERE ";
 
 /// The store in one SQLite file, with a write-ahead log that is synced at every commit.
 #[derive(Debug)]
@@ -80,15 +84,21 @@ impl Sqlite {
 }
 
 fn migrations() -> Migrator {
-    let queue = include_str!("0001_queue.sql").into_sql_str();
-    let description = Cow::Borrowed("queue");
-    Migrator::with_migrations(vec![Migration::new(
-        1,
-        description,
-        MigrationType::Simple,
-        queue,
-        false,
-    )])
+    let steps = [
+        ("queue", include_str!("0001_queue.sql")),
+        ("verdict", include_str!("0002_verdict.sql")),
+    ];
+    let migration = |(version, (description, sql)): (i64, (&'static str, &'static str))| {
+        let description = Cow::Borrowed(description);
+        Migration::new(
+            version,
+            description,
+            MigrationType::Simple,
+            sql.into_sql_str(),
+            false,
+        )
+    };
+    Migrator::with_migrations((1..).zip(steps).map(migration).collect())
 }
 
 #[async_trait]
@@ -147,7 +157,7 @@ impl Store for Sqlite {
     }
 
     async fn job(&self, id: JobId) -> Result<Option<Job>, StoreError> {
-        let row = sqlx::query("SELECT * FROM jobs WHERE id = $1")
+        let row = sqlx::query(sqlx::AssertSqlSafe(format!("{JOB}id = $1")))
             .bind(id.to_string())
             .fetch_optional(&self.reader)
             .await
@@ -156,19 +166,17 @@ impl Store for Sqlite {
     }
 
     async fn jobs(&self, over: u32) -> Result<Vec<Job>, StoreError> {
-        let waiting = sqlx::query(
-            "SELECT * FROM jobs WHERE state NOT IN ('done', 'failed', 'cancelled') ORDER BY place",
-        )
-        .fetch_all(&self.reader)
-        .await
-        .map_err(failed("list the queue"))?;
-        let over = sqlx::query(
-            "SELECT * FROM jobs WHERE state IN ('done', 'failed', 'cancelled') ORDER BY place DESC LIMIT $1",
-        )
-        .bind(i64::from(over))
-        .fetch_all(&self.reader)
-        .await
-        .map_err(failed("list jobs that are over"))?;
+        const WAITING: &str = "state NOT IN ('done', 'failed', 'cancelled') ORDER BY place";
+        const OVER: &str = "state IN ('done', 'failed', 'cancelled') ORDER BY place DESC LIMIT $1";
+        let waiting = sqlx::query(sqlx::AssertSqlSafe(format!("{JOB}{WAITING}")))
+            .fetch_all(&self.reader)
+            .await
+            .map_err(failed("list the queue"))?;
+        let over = sqlx::query(sqlx::AssertSqlSafe(format!("{JOB}{OVER}")))
+            .bind(i64::from(over))
+            .fetch_all(&self.reader)
+            .await
+            .map_err(failed("list jobs that are over"))?;
         waiting.iter().chain(&over).map(job).collect()
     }
 
@@ -200,10 +208,11 @@ impl Store for Sqlite {
         transaction.commit().await.map_err(failed())
     }
 
-    async fn reported(&self, run: &str, at: &str) -> Result<(), StoreError> {
-        sqlx::query("UPDATE runs SET reported = $2 WHERE id = $1")
+    async fn reported(&self, run: &str, at: &str, verdict: VerdictView) -> Result<(), StoreError> {
+        sqlx::query("UPDATE runs SET reported = $2, verdict = $3 WHERE id = $1")
             .bind(run)
             .bind(at)
+            .bind(word(&verdict))
             .execute(&self.writer)
             .await
             .map_err(failed("note a report"))?;

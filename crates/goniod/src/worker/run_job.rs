@@ -103,6 +103,7 @@ impl<S: RigSource> RigWorker<S> {
             directory: self.shared.runs().join(session::run_directory_name(now, &id)),
             started: humantime::format_rfc3339_seconds(now).to_string(),
             reported: None,
+            verdict: None,
             planned: header.plan.steps.len() as u64,
             accepted: 0,
         };
@@ -161,14 +162,17 @@ impl<S: RigSource> RigWorker<S> {
         let directory = RunDirectory::at(&view.directory);
         let writing = tokio::task::spawn_blocking(move || crate::daemon::write(&directory, &records));
         // A report that panics costs no measurement and not the thread of the rig.
-        self.attend(writing)
+        let report = self
+            .attend(writing)
             .await
             .map_err(|panic| report::ReportError::Write {
                 path: view.directory,
                 source: std::io::Error::other(panic),
             })??;
         let now = shared.now();
-        self.attend(shared.store.reported(run, &now)).await?;
+        let verdict = view::verdict(report.verdict);
+        self.attend(shared.store.reported(run, &now, verdict)).await?;
+        self.report(WorkerEvent::Reported { verdict }).await;
         Ok(())
     }
 }

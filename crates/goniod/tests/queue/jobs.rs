@@ -1,5 +1,5 @@
 use capture::{FileJournal, Record};
-use goniod::{Action, JobState, RefusalKind, What};
+use goniod::{Action, JobState, RefusalKind, VerdictView, What};
 use rig::RigFile;
 
 use crate::bench::{Bench, SHORT, idle, on_stage, operator, readings, rig, state, submission, until};
@@ -64,6 +64,22 @@ async fn that_a_specimen_is_on_the_stage_holds_for_the_stage_as_it_was() {
     // Said of an empty queue it holds at once.
     let third = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
     state(&mut events, third.id, JobState::Done).await;
+    daemon.shutdown().await;
+}
+
+/// Nothing lies on the stage: the job is done, and nobody may take what it measured for a specimen.
+#[tokio::test]
+async fn a_job_whose_result_is_none_is_done_and_bad() {
+    let bench = Bench::new("sim.specimen = \"black\"");
+    let daemon = bench.open().await;
+    let mut events = daemon.events(None);
+    let job = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    let done = state(&mut events, job.id, JobState::Done).await;
+    assert_eq!(done.verdict, Some(VerdictView::Bad), "who watches is told");
+    let run = &daemon.runs().await.unwrap()[0];
+    assert_eq!(run.verdict, Some(VerdictView::Bad));
+    let kept = daemon.jobs().await.unwrap();
+    assert_eq!(kept[0].verdict, Some(VerdictView::Bad), "and who asks later");
     daemon.shutdown().await;
 }
 

@@ -5,3 +5,4 @@ mod bench;
 mod coverage;
 mod flight;
 mod range;
+mod verdicts;

@@ -7,7 +7,7 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
 use crate::store::StoreError;
-use crate::{Job, RunView};
+use crate::{Job, RunView, VerdictView};
 
 pub(super) fn failed(what: &'static str) -> impl Fn(sqlx::Error) -> StoreError {
     move |source| StoreError::Query { what, source }
@@ -27,6 +27,7 @@ pub(super) fn job(row: &SqliteRow) -> Result<Job, StoreError> {
         state: of_word(&column::<String>(row, "state")?, "job")?,
         why: column(row, "why")?,
         run: column(row, "run")?,
+        verdict: verdict(row)?,
         by: column(row, "submitted_by")?,
         submitted: column(row, "submitted")?,
         changed: column(row, "changed")?,
@@ -45,9 +46,16 @@ pub(super) fn run(row: &SqliteRow) -> Result<RunView, StoreError> {
         directory: column::<String>(row, "directory")?.into(),
         started: column(row, "started")?,
         reported: column(row, "reported")?,
+        verdict: verdict(row)?,
         planned: number(row, "planned")?,
         accepted: number(row, "accepted")?,
     })
+}
+
+/// What the checks said of a run.
+fn verdict(row: &SqliteRow) -> Result<Option<VerdictView>, StoreError> {
+    let word: Option<String> = column(row, "verdict")?;
+    word.map(|word| of_word(&word, "verdict")).transpose()
 }
 
 pub(super) fn column<'r, T>(row: &'r SqliteRow, name: &'static str) -> Result<T, StoreError>

@@ -2,7 +2,7 @@ use capture::Outcome;
 use tempfile::TempDir;
 
 use super::*;
-use crate::{FaultCode, JobState};
+use crate::{FaultCode, JobState, VerdictView};
 
 fn end(text: &str) -> Record {
     Record::End {
@@ -25,6 +25,7 @@ async fn with_run(store: &Sqlite) -> RunView {
         state: JobState::AwaitingSpecimen,
         why: Some("so".to_owned()),
         run: None,
+        verdict: None,
         by: "me".to_owned(),
         submitted: "then".to_owned(),
         changed: "now".to_owned(),
@@ -38,6 +39,7 @@ async fn with_run(store: &Sqlite) -> RunView {
         directory: "/runs/01".into(),
         started: "then".to_owned(),
         reported: None,
+        verdict: None,
         planned: 3,
         accepted: 0,
     };
@@ -74,9 +76,13 @@ async fn what_was_kept_is_there_after_it_is_opened_again() {
     let fault = store.latched().await.unwrap().expect("it is latched");
     assert_eq!((fault.code, fault.text.as_str()), (FaultCode::NoReply, "silent"));
     assert_eq!(fault.run, Some(run.id.clone()));
-    store.reported(&run.id, "now").await.unwrap();
-    let reported = store.run(&run.id).await.unwrap().unwrap().reported;
-    assert_eq!(reported.as_deref(), Some("now"));
+    let bad = VerdictView::Bad;
+    store.reported(&run.id, "now", bad).await.unwrap();
+    let reported = store.run(&run.id).await.unwrap().unwrap();
+    assert_eq!(reported.reported.as_deref(), Some("now"));
+    assert_eq!(reported.verdict, Some(bad));
+    let job = store.job(run.job).await.unwrap().unwrap();
+    assert_eq!(job.verdict, Some(bad), "the job says it too");
     store.close().await;
 }
 
