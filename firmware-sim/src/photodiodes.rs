@@ -74,7 +74,9 @@ impl Photodiodes {
             let lit =
                 responsivity * (1.0 + responsivity_error) * 1e6 * (signal + stray_per_sr * light.lamp_s);
             let noisy = gain * shot(lit + dark, electrons, &mut random);
-            let shown = noisy * (1.0 - nonlinearity * noisy.min(full_scale) / full_scale);
+            // Beyond the top of the parabola, where every reading is full, the counts shown go on growing.
+            let lost = (nonlinearity * noisy / full_scale).min(0.5);
+            let shown = noisy * (1.0 - lost);
             self.convert(shown + dark_offset_counts, &mut random)
         };
         let others = |signal: DVec3| (DVec3::splat(signal.element_sum()) - signal) / 2.0;

@@ -79,6 +79,16 @@ impl Envelope {
         pose.separation_rad() < self.separation_rad
     }
 
+    /// How much further apart than the separation the arms stay, rad, while each of them moves by so much (rad, sign
+    /// ignored), half of it before and half after they are at `pose`; negative where one may shadow the other, or pass it.
+    ///
+    /// As a motion is, this is judged over every pose of the rectangle that the two arms sweep, however they share the
+    /// time. NaN where an angle is no number.
+    pub fn clearance_rad(&self, pose: Pose, swept_rad: [f64; 2]) -> f64 {
+        let [light, sensor] = swept_rad.map(f64::abs);
+        pose.separation_rad() - (light + sensor) / 2.0 - self.separation_rad
+    }
+
     /// Checks that a pose may be taken.
     ///
     /// # Errors

@@ -15,7 +15,7 @@ const ABRUPT: f64 = 1e4;
 
 /// One pass over a stretch of steps, without a stop: where the arms are, and how fast they may go.
 ///
-/// Each step has its cell, half-way to its neighbours; its light is collected within. An arm goes as fast as the light
+/// Each step has its cell, half-way to its neighbours and clear of the arms' shadow; its light is collected within. An arm goes as fast as the light
 /// that is needed fits into the cells, and no faster than its profile.
 #[derive(Clone, Debug)]
 pub(crate) struct Flight<'a> {
@@ -50,18 +50,10 @@ impl<'a> Flight<'a> {
             .iter()
             .map(|step| (step.pose().angle(lead) - first.angle(lead)).abs())
             .collect();
-        let half =
-            |i: usize, j: Option<usize>| j.and_then(|j| along.get(j)).map(|to| (to - along[i]).abs() / 2.0);
-        let edges = (0..along.len())
-            .map(|i| {
-                let (before, after) = (half(i, i.checked_sub(1)), half(i, Some(i + 1)));
-                let outermost = before.or(after).unwrap_or(0.0);
-                [
-                    along[i] - before.unwrap_or(outermost),
-                    along[i] + after.unwrap_or(outermost),
-                ]
-            })
-            .collect();
+        let poses: Vec<Pose> = steps.iter().map(Step::pose).collect();
+        // Where an arm is in flight is foreseen no better than to where it comes to rest.
+        let margin_rad = file.uncertainty.shadow_margin_rad() + file.motion.tolerance_rad;
+        let edges = sweep::cells(&poses, lead, &file.envelope, margin_rad);
         let arm = file.arm(lead);
         Self {
             steps,
@@ -177,6 +169,15 @@ impl<'a> Flight<'a> {
             sensor: ArmAngle::from_rad(at[1].0),
         };
         (pose, at[0].1.max(at[1].1) / self.axis.resolution_rad())
+    }
+
+    /// Twice the way, rad, that each arm went from the middle of an integration to that end of it which was further.
+    pub(crate) fn reach(&self, middle_s: f64, duration_s: f64) -> [f64; 2] {
+        self.tracks.each_ref().map(|track| {
+            let middle = track.expected(middle_s);
+            let way = |t_s: f64| (track.expected(t_s) - middle).abs();
+            2.0 * way(middle_s - duration_s / 2.0).max(way(middle_s + duration_s / 2.0))
+        })
     }
 
     /// How fast each arm was then, rad/s.

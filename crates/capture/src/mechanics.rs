@@ -9,8 +9,8 @@ use crate::exposure::brief;
 pub fn mechanics(rig: &RigFile, start: Option<Pose>) -> Mechanics {
     Mechanics {
         envelope: rig.envelope,
-        // Twice the standard uncertainty of the difference of two angles.
-        margin_rad: 2.0 * 2f64.sqrt() * rig.uncertainty.zero_rad.hypot(rig.uncertainty.angle_rad),
+        margin_rad: rig.uncertainty.shadow_margin_rad(),
+        tolerance_rad: rig.motion.tolerance_rad,
         profiles: rig.arms.each_ref().map(|arm| arm.profile),
         resolution_rad: rig.arms.each_ref().map(|arm| arm.axis.resolution_rad()),
         grid_rad: rig

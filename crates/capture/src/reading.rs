@@ -15,6 +15,8 @@ pub enum Flag {
     Blurred,
     /// The bus had to be asked more than once.
     Retried,
+    /// One arm may have shadowed the other within the integration.
+    Shadowed,
 }
 
 /// One reading of the photometer with its pose, raw: nothing is subtracted or divided.

@@ -88,10 +88,13 @@ fn say(calibrated: &Calibrated) {
             200.0 * u
         ));
         terminal::say(format_args!(
-            "          gains ×1, ×{:.3}, ×{:.2}; {:.3} % lost at full scale",
+            "          gains ×1, ×{:.3} (± {:.2} %), ×{:.2} (± {:.2} %); {:.3} % (± {:.3} %) lost at full scale, k = 2",
             white.gains[1],
+            200.0 * white.u_gains[1],
             white.gains[2],
-            100.0 * white.nonlinearity
+            200.0 * white.u_gains[2],
+            100.0 * white.nonlinearity,
+            200.0 * white.u_nonlinearity
         ));
     }
     if let Some(trap) = &certificate.trap {
@@ -107,7 +110,7 @@ fn say(calibrated: &Calibrated) {
     }
     if let Some(zero) = &certificate.zero {
         terminal::say(format_args!(
-            "mirror    {:.3}° to be added to each angle (± {:.3}°, k = 2)",
+            "mirror    {:.3}° to be added to each angle (half the sum of the zeros ± {:.3}°, k = 2; their difference is not told)",
             zero.offset_rad.to_degrees(),
             2.0 * zero.u_rad.to_degrees()
         ));

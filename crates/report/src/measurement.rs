@@ -18,7 +18,8 @@ pub struct Measurement {
     pub reading: Reading,
     /// Where the arms really were, by what was measured and the certificate's alignment.
     pub pose: Pose,
-    /// Whether the arms shadowed each other there: planned around, so only where the alignment was not known before.
+    /// Whether the arms may have shadowed each other there, within the integration and as far as the zeros are known.
+    /// Plans keep clear of it.
     pub shadowed: bool,
     /// Zenith angle of the sensor there, rad.
     pub theta_r: f64,
@@ -76,7 +77,7 @@ pub fn measurements(records: &[Record], rig: &RigFile) -> Vec<Measurement> {
         let pose = reduction.aligned(reading.measured);
         Measurement {
             pose,
-            shadowed: rig.envelope.occluded(pose),
+            shadowed: rig.shadowed(pose, reading.swept_rad.unwrap_or_default()),
             theta_r: pose.sensor.rad().abs(),
             deviation: pose.deviation() * 1_f64.copysign(pose.sensor.rad()),
             reflectance: reflectance.map(|result| result.map(|good| DVec3::from_array(good.rgb))),

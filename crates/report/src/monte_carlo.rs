@@ -4,13 +4,13 @@ use pdv::{FactorTable, Model, Observation};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use rig::RigFile;
+use rig::{RigFile, ZeroUncertainty};
 use sweep::{Job, Sweep};
 
 use crate::Measurement;
 use crate::derive::Sweeps;
 use crate::measurement::{observation, visits};
-use crate::uncertainty::{COVERAGE, angles};
+use crate::uncertainty::{COVERAGE, zeros};
 
 /// Draws: the standard deviation over them is known to 13 %.
 const DRAWS: usize = 32;
@@ -22,8 +22,8 @@ const SEED: u64 = 0x676f_6e69_6f64;
 /// The reconstruction made again of readings that differ from the measured ones as they may be wrong: what a result's
 /// spread over these models is, is its uncertainty.
 ///
-/// What is common to readings stays common: responsivity, linearity, stray light and the zeros of the arms are drawn once a
-/// draw, the lamp and the dark level once for each sweep; counting noise and an arm's angle in each reading for themselves.
+/// What is common to readings stays common: responsivity, linearity, each gain step, colour mixing, stray light and the sum
+/// and the difference of the arms' zeros are drawn once a draw, the lamp and the dark level once for each sweep; counting noise and an arm's angle in each reading for themselves.
 pub struct MonteCarlo {
     models: Vec<Box<dyn Model>>,
 }
@@ -32,9 +32,10 @@ impl MonteCarlo {
     /// Draws of a job's measurements. Empty where no model can be made of them.
     pub fn new(job: &Job, measurements: &[Measurement], records: &[capture::Record], rig: &RigFile) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(SEED);
-        let [angle, zero] = angles(records, rig);
+        let angle = rig.uncertainty.angle_rad;
+        let zeros = zeros(records, rig);
         let draw = |_| {
-            let common = Common::draw(&mut random, zero);
+            let common = Common::draw(&mut random, zeros);
             let mut sweep = |sweep: Sweep| -> Vec<Observation> {
                 let of_sweep: [DVec3; 2] = [normal3(&mut random), normal3(&mut random)];
                 let mut draw = |visit: &Vec<usize>| {
@@ -100,6 +101,8 @@ impl Brdf for MonteCarlo {
 struct Common {
     reference: DVec3,
     linearity: f64,
+    gain: [f64; 3],
+    colour: DVec3,
     stray: f64,
     aperture: f64,
     /// Rad.
@@ -107,14 +110,18 @@ struct Common {
 }
 
 impl Common {
-    fn draw(random: &mut ChaCha8Rng, zero: f64) -> Self {
+    fn draw(random: &mut ChaCha8Rng, zeros: ZeroUncertainty) -> Self {
+        let half_sum = zeros.half_sum_rad * normal(random);
+        let half_difference = zeros.half_difference_rad * normal(random);
         Self {
             // A reference is as wrong in one colour as in the others, more or less.
             reference: DVec3::splat(normal(random)),
             linearity: normal(random),
+            gain: [normal(random), normal(random), normal(random)],
+            colour: normal3(random),
             stray: normal(random),
             aperture: normal(random),
-            zeros: [zero * normal(random), zero * normal(random)],
+            zeros: [half_sum + half_difference, half_sum - half_difference],
         }
     }
 
@@ -128,6 +135,15 @@ impl Common {
     ) -> Option<DVec3> {
         let budget = m.budget?;
         let u = DVec3::from_array;
+        let gain: DVec3 = budget
+            .gain
+            .iter()
+            .zip(self.gain)
+            .map(|(&step, draw)| u(step) * draw)
+            .sum();
+        // A channel takes from the other colours where they are brighter, and gives where they are darker.
+        let raw = m.raw?;
+        let others = (DVec3::splat(raw.element_sum()) - 3.0 * raw).signum();
         let [light, sensor] = self.zeros.map(|zero| zero + angle * normal(random));
         Some(
             u(budget.counting) * normal3(random)
@@ -135,6 +151,8 @@ impl Common {
                 + u(budget.drift) * drift
                 + u(budget.reference) * self.reference
                 + u(budget.linearity) * self.linearity
+                + gain
+                + u(budget.colour) * others * self.colour
                 + u(budget.stray) * self.stray
                 + m.sensitivity.arms[0] * light
                 + m.sensitivity.arms[1] * sensor

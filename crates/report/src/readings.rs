@@ -2,8 +2,11 @@ use std::io;
 
 use serde::Serialize;
 
+use rig::Budget;
+
 use crate::Measurement;
 use crate::run::flag_name;
+use crate::uncertainty::COVERAGE;
 
 /// One row of readings.csv. The order of the columns is fixed; new ones come at the end.
 #[derive(Serialize)]
@@ -42,12 +45,28 @@ struct Row {
     light_swept_deg: Option<f64>,
     sensor_swept_deg: Option<f64>,
     exposures: usize,
+    u_gain_r: Option<f64>,
+    u_gain_g: Option<f64>,
+    u_gain_b: Option<f64>,
+    u_linearity_r: Option<f64>,
+    u_linearity_g: Option<f64>,
+    u_linearity_b: Option<f64>,
+    u_colour_r: Option<f64>,
+    u_colour_g: Option<f64>,
+    u_colour_b: Option<f64>,
 }
 
 impl Row {
     fn new(index: usize, measurement: &Measurement) -> Self {
         let reading = &measurement.reading;
         let (pdv, rgb) = (measurement.pdv(), measurement.rgb());
+        let term = |of: fn(&Budget) -> [f64; 3]| match &measurement.budget {
+            Some(budget) => of(budget).map(|u| Some(COVERAGE * u)),
+            None => [None; 3],
+        };
+        let [u_gain_r, u_gain_g, u_gain_b] = term(Budget::all_gains);
+        let [u_linearity_r, u_linearity_g, u_linearity_b] = term(|budget| budget.linearity);
+        let [u_colour_r, u_colour_g, u_colour_b] = term(|budget| budget.colour);
         let flags: Vec<&str> = reading.flags.iter().map(|&flag| flag_name(flag)).collect();
         Self {
             index,
@@ -84,6 +103,15 @@ impl Row {
             light_swept_deg: reading.swept_rad.map(|[light, _]| light.to_degrees()),
             sensor_swept_deg: reading.swept_rad.map(|[_, sensor]| sensor.to_degrees()),
             exposures: measurement.exposures,
+            u_gain_r,
+            u_gain_g,
+            u_gain_b,
+            u_linearity_r,
+            u_linearity_g,
+            u_linearity_b,
+            u_colour_r,
+            u_colour_g,
+            u_colour_b,
         }
     }
 }
@@ -91,7 +119,9 @@ impl Row {
 /// Writes readings.csv: one row a reading, in the order in which they were taken; reflectance in sr⁻¹, empty where a
 /// reading has none (lamp off, saturated). `u` is the expanded uncertainty, k = 2; `raw` the reflectance in the sensor's
 /// own colours, `swept` by how much an arm moved within an integration in flight; `exposures` is how many f is the mean
-/// of: f and u of a reading that counts are of all exposures of its pose, the counts its own.
+/// of: f and u of a reading that counts are of all exposures of its pose, the counts its own. `u_gain`, `u_linearity` and
+/// `u_colour` are the terms of u (k = 2, sr⁻¹) that all readings of a gain, or of the run, have in common: what the gain
+/// steps amplify by, the loss towards full scale, and the light of other colours in a channel.
 ///
 /// # Errors
 /// The medium refused.

@@ -283,6 +283,7 @@ pub fn flag_name(flag: Flag) -> &'static str {
         Flag::Dim => "dim",
         Flag::Blurred => "blurred",
         Flag::Retried => "retried",
+        Flag::Shadowed => "shadowed",
     }
 }
 

@@ -170,7 +170,7 @@ impl Standard {
             Self::Trap => TRAP_SENSOR_DEG
                 .into_iter()
                 .flat_map(|sensor| TRAP_LIGHT_DEG.map(|light| Pose::from_deg(light, sensor)))
-                .filter(|&pose| file.envelope.check_pose(pose).is_ok() && !file.envelope.occluded(pose))
+                .filter(|&pose| file.envelope.check_pose(pose).is_ok() && readable(file, pose))
                 .filter(|pose| pose.light < pose.sensor)
                 .map(ranged)
                 .collect(),
@@ -264,6 +264,11 @@ impl Standard {
             ..of
         }
     }
+}
+
+/// Whether the arms keep clear of each other's shadow wherever they may come to rest for a pose, as plans demand.
+fn readable(file: &RigFile, pose: Pose) -> bool {
+    !file.shadowed(file.nearest(pose), [2.0 * file.motion.tolerance_rad; 2])
 }
 
 /// Mean reflectance factor of what lies on the stage, in the sensor's own colours.

@@ -4,8 +4,10 @@ use crate::Gain;
 
 mod certificate;
 mod dark;
+mod ladder;
 mod lamp;
 mod line;
+mod linearity;
 mod measure;
 mod rate;
 mod reduction;
@@ -13,7 +15,7 @@ mod taken;
 #[cfg(test)]
 mod tests;
 
-pub use certificate::{Certificate, Colour, Conditions, Patch, Trap, White, Zero};
+pub use certificate::{Certificate, Colour, Conditions, Patch, Trap, White, Zero, ZeroUncertainty};
 pub use dark::{Dark, DarkCounts, Darks};
 pub use lamp::{Drift, Lamp};
 pub use measure::Certified;

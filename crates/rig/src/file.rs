@@ -115,6 +115,13 @@ pub struct Uncertainties {
     pub read_noise_counts: f64,
     /// Of the rig file's responsivity, relative.
     pub responsivity: f64,
+    /// Of a gain step above ×1, relative to its nominal factor, where no white reference was measured.
+    pub gain: f64,
+    /// Of the share of the counts that is lost at full scale, where no white reference was measured.
+    pub nonlinearity: f64,
+    /// Of the share of a colour channel's light that comes from the two other colours, where no colour patches were
+    /// measured.
+    pub crosstalk: f64,
     /// Of the stray light, as f·cos in sr⁻¹, where no black trap was measured.
     pub stray_per_sr: f64,
     /// Of an arm's angle at each reading, rad.
@@ -123,6 +130,14 @@ pub struct Uncertainties {
     pub zero_rad: f64,
     /// Half angles of source and detector as the specimen sees them, rad.
     pub apertures_rad: [f64; 2],
+}
+
+impl Uncertainties {
+    /// How much further apart than the separation the arms must be while they are read, rad: twice the standard
+    /// uncertainty of the angle between them. A mirror does not lower it, since it tells the sum of the zeros alone.
+    pub fn shadow_margin_rad(&self) -> f64 {
+        2.0 * std::f64::consts::SQRT_2 * self.zero_rad.hypot(self.angle_rad)
+    }
 }
 
 /// `[bus]`
@@ -254,6 +269,14 @@ impl RigFile {
     /// Settings of one arm.
     pub fn arm(&self, arm: Arm) -> &ArmSettings {
         &self.arms[arm as usize]
+    }
+
+    /// Whether one arm may shadow the other while they are read: at a pose, and in flight over all that each of them
+    /// sweeps (rad) within the integration of which the pose is the middle, as far as the angles are known.
+    pub fn shadowed(&self, pose: Pose, swept_rad: [f64; 2]) -> bool {
+        let clearance = self.envelope.clearance_rad(pose, swept_rad);
+        // NaN is nowhere.
+        clearance.is_nan() || clearance < self.uncertainty.shadow_margin_rad()
     }
 
     /// The pose nearest to `pose` that the servos can be told to take: whole counts.

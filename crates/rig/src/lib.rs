@@ -21,7 +21,7 @@ pub use actuator::{Actuator, Identity, Location};
 pub use axis::{ACCELERATION_UNIT_RAD_S2, Axis, COUNTS_PER_TURN, VELOCITY_UNIT_RAD_S};
 pub use calibration::{
     Budget, Calibration, Certificate, Certified, Colour, Conditions, Dark, DarkCounts, Darks, Drift, Filling,
-    Lamp, MIN_COSINE, Patch, Reduction, Reflectance, Taken, Trap, Unusable, White, Zero,
+    Lamp, MIN_COSINE, Patch, Reduction, Reflectance, Taken, Trap, Unusable, White, Zero, ZeroUncertainty,
 };
 pub use detector::{Counts, Detector, DetectorStatus, Exposure, Gain, Phase};
 pub use drive::{Drive, DriveError};

@@ -4,6 +4,7 @@
 //! nothing here moves an arm, reads a clock or knows of devices.
 
 mod addition;
+mod cell;
 mod error;
 mod file;
 mod first;
@@ -21,6 +22,7 @@ mod targets;
 mod unread;
 
 pub use addition::{Addition, add};
+pub use cell::cells;
 pub use error::SweepError;
 pub use file::{MAX_PLANES, THETA_R_DEG};
 pub use floor::floor_s;

@@ -8,6 +8,8 @@ pub struct Mechanics {
     pub envelope: Envelope,
     /// How much further apart than the separation the arms must be for a reading, rad: so unsure are their angles.
     pub margin_rad: f64,
+    /// How far an arm may be from where it was told to be for a reading, rad.
+    pub tolerance_rad: f64,
     /// Profiles of light and sensor arm.
     pub profiles: [Profile; 2],
     /// Smallest step of each arm, rad.

@@ -1,6 +1,7 @@
 use arms::{Arm, Pose, Profile};
 
 use crate::Mechanics;
+use crate::cell::cells;
 
 /// Fewest poses that are worth a pass.
 const FEWEST: usize = 3;
@@ -24,7 +25,13 @@ pub(crate) fn pass(mechanics: &Mechanics, poses: &[Pose]) -> Option<Vec<f64>> {
         && mechanics.envelope.check_path(first, last).is_ok();
     let along: Vec<f64> = poses.iter().map(|pose| way(pose, lead)).collect();
     let onward = along.windows(2).all(|pair| pair[0] < pair[1]);
-    (sound && onward).then(|| seconds(&along, mechanics.profiles[lead as usize], mechanics.flight_s))
+    let margin_rad = mechanics.margin_rad + mechanics.tolerance_rad;
+    let widths: Vec<f64> = cells(poses, lead, &mechanics.envelope, margin_rad)
+        .into_iter()
+        .map(|[low, high]| (high - low).max(mechanics.resolution_rad[lead as usize]))
+        .collect();
+    let profile = mechanics.profiles[lead as usize];
+    (sound && onward).then(|| seconds(&along, &widths, profile, mechanics.flight_s))
 }
 
 /// Whether the other arm stands, or goes as far as the lead at every pose, on the same servo and profile.
@@ -44,13 +51,13 @@ fn together(mechanics: &Mechanics, poses: &[Pose], lead: Arm) -> bool {
         && poses.iter().all(alike)
 }
 
-/// Times between places along a way, rad, with `reading_s` for each.
-fn seconds(along: &[f64], profile: Profile, reading_s: f64) -> Vec<f64> {
+/// Times between places along a way, rad, with `reading_s` for each, in which the arms go no further than its width, rad.
+fn seconds(along: &[f64], widths: &[f64], profile: Profile, reading_s: f64) -> Vec<f64> {
     let (fastest, a) = (profile.velocity_rad_s, profile.acceleration_rad_s2);
     let last = along.len() - 1;
     let allowed = |i: usize| {
         let cell = (along[(i + 1).min(last)] - along[i.saturating_sub(1)]) / 2.0;
-        fastest.min(cell / reading_s.max(f64::MIN_POSITIVE))
+        fastest.min(cell.min(widths[i]) / reading_s.max(f64::MIN_POSITIVE))
     };
     let mut speeds: Vec<f64> = (0..=last).map(allowed).collect();
     (speeds[0], speeds[last]) = (0.0, 0.0);
@@ -85,7 +92,7 @@ mod tests {
         for way in [0.1, 0.5, 2.5] {
             for n in [3_u32, 10, 200] {
                 let along: Vec<f64> = (0..=n).map(|i| way * f64::from(i) / f64::from(n)).collect();
-                let taken: f64 = seconds(&along, profile, 0.0).iter().sum();
+                let taken: f64 = seconds(&along, &[way; 201], profile, 0.0).iter().sum();
                 let straight = profile.duration_s(way);
                 assert!(
                     (taken / straight - 1.0).abs() < 1e-9,
@@ -102,7 +109,7 @@ mod tests {
             acceleration_rad_s2: f64::MAX,
         };
         let along: Vec<f64> = (0..=100).map(|i| f64::from(i) * 0.01).collect();
-        let taken: f64 = seconds(&along, profile, 0.05).iter().sum();
+        let taken: f64 = seconds(&along, &[1.0; 101], profile, 0.05).iter().sum();
         assert!((taken - 100.0 * 0.05).abs() < 0.15, "{taken} s");
     }
 }

@@ -1,4 +1,4 @@
-use arms::{Arm, Envelope, Pose, Violation};
+use arms::{Arm, Pose, Violation};
 
 use crate::Mechanics;
 use crate::route::overshoot;
@@ -43,11 +43,9 @@ impl<'a> Reach<'a> {
                 return Err(Hindrance::Limits(arm));
             }
         }
-        let wider = Envelope {
-            separation_rad: envelope.separation_rad + self.mechanics.margin_rad,
-            ..*envelope
-        };
-        if wider.occluded(pose) {
+        // Both arms may have stopped short of the pose, or in flight be read a little before or after it.
+        let stops = [2.0 * self.mechanics.tolerance_rad; 2];
+        if envelope.clearance_rad(pose, stops) < self.mechanics.margin_rad {
             return Err(Hindrance::Shadow);
         }
         if self.side != 0.0 && (pose.light - pose.sensor).signum() != self.side {

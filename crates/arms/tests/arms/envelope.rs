@@ -116,6 +116,42 @@ proptest! {
         }
     }
 
+    /// Whatever is swept, and however much each angle is off: with a margin of as much as both together, nothing is in
+    /// shadow.
+    #[test]
+    fn prop_what_is_clear_by_a_margin_is_nowhere_in_shadow_within_it(
+        pose in poses(95.0), swept in prop::array::uniform2(-0.2..0.2_f64), margin in 0.0..0.05_f64,
+        at in prop::array::uniform2(-0.5..=0.5_f64), share in 0.0..=1.0_f64, signs in prop::array::uniform2(prop::bool::ANY),
+    ) {
+        let envelope = envelope(true);
+        let off = [share * margin, (1.0 - share) * margin];
+        let angle = |arm: Arm, i: usize| {
+            let off = if signs[i] { off[i] } else { -off[i] };
+            ArmAngle::from_rad(pose.angle(arm).rad() + at[i] * swept[i] + off)
+        };
+        let within = Pose { light: angle(Arm::Light, 0), sensor: angle(Arm::Sensor, 1) };
+        if envelope.clearance_rad(pose, swept) > margin {
+            prop_assert!(!envelope.occluded(within), "{within:?}");
+            prop_assert_eq!((within.light - within.sensor).signum(), (pose.light - pose.sensor).signum());
+        }
+    }
+
+    /// And nothing is called in shadow that is not at some end of what is swept.
+    #[test]
+    fn prop_what_is_not_clear_is_in_shadow_at_a_corner_of_what_is_swept(
+        pose in poses(95.0), swept in prop::array::uniform2(0.0..0.05_f64),
+    ) {
+        let envelope = envelope(true);
+        let corner = |s: f64, t: f64| Pose {
+            light: ArmAngle::from_rad(pose.light.rad() + s * swept[0]),
+            sensor: ArmAngle::from_rad(pose.sensor.rad() + t * swept[1]),
+        };
+        let corners = [corner(0.5, 0.5), corner(0.5, -0.5), corner(-0.5, 0.5), corner(-0.5, -0.5)];
+        if envelope.clearance_rad(pose, swept) < -1e-12 {
+            prop_assert!(corners.into_iter().any(|corner| envelope.occluded(corner)), "{pose:?}");
+        }
+    }
+
     #[test]
     fn prop_a_refused_path_has_a_forbidden_pose(from in poses(88.0), to in poses(88.0)) {
         let envelope = envelope(false);

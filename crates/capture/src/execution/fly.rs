@@ -26,7 +26,7 @@ const IDLE_S: f64 = 0.002;
 
 impl<R: Rig> Execution<'_, R> {
     /// Flies the pass to which a step belongs, again where it was held. Its readings count once it has landed;
-    /// those that are saturated, too faint, blurred or missing are left to be taken at rest. So is the first of a sweep,
+    /// those that are saturated, too faint, blurred, shadowed or missing are left to be taken at rest. So is the first of a sweep,
     /// before it: the arms stand there, and how bright it is nothing else tells.
     pub(super) async fn pass(&mut self, pass: usize) -> Result<(), Interrupt<R::Error>> {
         loop {
@@ -248,7 +248,7 @@ impl<R: Rig> Execution<'_, R> {
     }
 
     /// Works out where each reading was taken and records it: as one that counts where the flight landed and it is neither
-    /// saturated, nor too faint, nor blurred.
+    /// saturated, nor too faint, nor blurred, and clear of the arms' shadow over the whole of its integration.
     async fn land(&mut self, flight: &Flight<'_>, landed: bool) -> Result<(), Interrupt<R::Error>> {
         let mut readings = std::mem::take(&mut self.aloft);
         for reading in &mut readings {
@@ -261,6 +261,9 @@ impl<R: Rig> Execution<'_, R> {
             if departure_counts > UNSTEADY_COUNTS {
                 reading.flags.push(Flag::Blurred);
             }
+            if self.file.shadowed(measured, flight.reach(t_s, exposure_s)) {
+                reading.flags.push(Flag::Shadowed);
+            }
         }
         let points: Vec<(f64, f64)> = readings
             .iter()
@@ -269,14 +272,17 @@ impl<R: Rig> Execution<'_, R> {
         for (at, mut reading) in readings.into_iter().enumerate() {
             let [light, sensor] = reading.swept_rad.unwrap_or_default();
             let added = blur(&points, at, light.abs().max(sensor.abs()));
-            let unsteady = !reading.flags.is_empty();
+            let unsteady = reading.flags.contains(&Flag::Blurred);
+            let shadowed = reading.flags.contains(&Flag::Shadowed);
             let blurred = unsteady || added.abs() > MOST_BLUR * points[at].1.abs();
             reading.flags = self.flags(&reading);
-            if blurred {
-                reading.flags.push(Flag::Blurred);
+            for (is, flag) in [(blurred, Flag::Blurred), (shadowed, Flag::Shadowed)] {
+                if is && !reading.flags.contains(&flag) {
+                    reading.flags.push(flag);
+                }
             }
             let faint = self.ranging.too_faint(&reading.counts);
-            reading.accepted = landed && !blurred && !reading.counts.saturated && !faint;
+            reading.accepted = landed && !blurred && !shadowed && !reading.counts.saturated && !faint;
             let step = self.plan.steps[reading.step].clone();
             self.emit(Event::Step {
                 step: step.index,

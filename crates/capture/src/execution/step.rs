@@ -122,10 +122,15 @@ impl<R: Rig> Execution<'_, R> {
 
     pub(super) fn flags(&self, reading: &Reading) -> Vec<Flag> {
         let dim = reading.lamp && self.ranging.dim(&reading.counts);
+        let shadowed = reading.lamp
+            && self
+                .file
+                .shadowed(reading.measured, reading.swept_rad.unwrap_or_default());
         [
             (reading.counts.saturated, Flag::Saturated),
             (dim && !reading.counts.saturated, Flag::Dim),
             (reading.retries > 0, Flag::Retried),
+            (shadowed, Flag::Shadowed),
         ]
         .into_iter()
         .filter_map(|(is, flag)| is.then_some(flag))

@@ -68,15 +68,20 @@ async fn one(seed: u64, specimen: Arc<dyn Brdf>, whole: &mut Tally, grazing: &mu
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
     // The amounts of [uncertainty]; play and lobe-wide blur are systematic and have tests of their own.
     let text = format!(
-        "[calibration]\nmonitor = 5.0\n[uncertainty]\nresponsivity_percent = 0.2\nangle_deg = 0.0\nzero_deg = 0.02\n\
+        "[calibration]\nmonitor = 5.0\n[uncertainty]\nresponsivity_percent = 0.2\ngain_percent = 0.1\n\
+         nonlinearity_percent = 0.1\ncrosstalk_percent = 0.2\nangle_deg = 0.0\nzero_deg = 0.02\n\
          source_aperture_deg = 0.0\ndetector_aperture_deg = 0.0\n\
          [sim]\nseed = {}\nresponsivity_error = {}\nlight_zero_deg = {}\nsensor_zero_deg = {}\nstray_per_sr = {}\n\
+         gain_error = {}\nnonlinearity = {}\ncrosstalk = {}\n\
          light_backlash_deg = 0.0\nsensor_backlash_deg = 0.0\nsource_aperture_deg = 0.0\ndetector_aperture_deg = 0.0\n",
         1000 + seed,
         0.002 * normal(),
         0.02 * normal(),
         0.02 * normal(),
         Imperfections::DEFAULT.stray_per_sr * normal().abs(),
+        0.001 * normal(),
+        0.001 * normal().abs(),
+        0.002 * normal().abs(),
     );
     let laboratory = Laboratory::new(&text);
     let records = laboratory.measure(specimen.clone(), JOB).await;

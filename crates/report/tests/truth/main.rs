@@ -2,7 +2,10 @@
 
 mod absolute;
 mod bench;
+mod calibrated;
 mod coverage;
 mod flight;
+mod gap;
+mod photometer;
 mod range;
 mod verdicts;

@@ -104,13 +104,16 @@ async fn one(seed: u64, tally: &mut Tally) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
     let text = format!(
-        "[uncertainty]\nresponsivity_percent = 0.2\n[sim]\nseed = {}\nresponsivity_error = {}\nlight_zero_deg = {}\n\
-         sensor_zero_deg = {}\nstray_per_sr = {}\n",
+        "[uncertainty]\nresponsivity_percent = 0.2\ngain_percent = 0.1\nnonlinearity_percent = 0.1\n\
+         crosstalk_percent = 0.0\n[sim]\nseed = {}\nresponsivity_error = {}\nlight_zero_deg = {}\n\
+         sensor_zero_deg = {}\nstray_per_sr = {}\ngain_error = {}\nnonlinearity = {}\n",
         1000 + seed,
         0.002 * normal(),
         0.02 * normal(),
         0.02 * normal(),
         Imperfections::DEFAULT.stray_per_sr * normal().abs(),
+        0.001 * normal(),
+        0.001 * normal().abs(),
     );
     let laboratory = Laboratory::new(&text);
     let records = laboratory.measure(Arc::new(Decades), JOB).await;

@@ -1,6 +1,7 @@
 use arms::{ArmAngle, Pose};
 use serde::{Deserialize, Serialize};
 
+use super::linearity::Linearity;
 use crate::{Gain, RigFile};
 
 /// What was found out about a rig by calibrating it, part by part. It is stored, named in each run that uses it, and
@@ -50,7 +51,11 @@ pub struct White {
     pub u_responsivity: [f64; 3],
     /// What the gain steps really amplify; the first is 1.
     pub gains: [f64; 3],
-    /// Share of the counts that is lost at full scale; the loss grows with the square of the counts.
+    /// Relative standard uncertainty of each; that of the first is 0, since the others are told by it.
+    #[serde(default = "u_gains_built_in")]
+    pub u_gains: [f64; 3],
+    /// Share of the counts that is lost where the signal reaches full scale; the loss grows with the square of the
+    /// signal.
     pub nonlinearity: f64,
     /// Standard uncertainty of that share.
     pub u_nonlinearity: f64,
@@ -69,16 +74,47 @@ pub struct Trap {
 
 /// By how much the arms' zeros are off, from the symmetry of a mirror's lobe.
 ///
-/// A mirror tells the sum of both zeros alone: a difference looks like a tilted specimen, which the next specimen
-/// has differently. Half of the sum goes to each arm.
+/// The lobe stands where both true angles add up to 0, so it tells the sum of both zeros alone: half of the sum is added to
+/// each arm. Where one zero is too large by as much as the other is too small nothing moves, so their difference stays as
+/// unsure as it was; see [`ZeroUncertainty`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Zero {
     /// How it was made.
     pub conditions: Conditions,
     /// To be added to each arm's measured angle, rad.
     pub offset_rad: f64,
-    /// Its standard uncertainty, rad.
+    /// Standard uncertainty of half the sum of both zeros, rad.
     pub u_rad: f64,
+}
+
+/// How unsure the zeros of both arms are. Half their sum turns both arms the same way and half their difference turns
+/// them towards each other; the two are independent of each other, the zeros of the arms are not.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ZeroUncertainty {
+    /// Standard uncertainty of half the sum of both zeros, rad.
+    pub half_sum_rad: f64,
+    /// Standard uncertainty of half the difference, light less sensor, rad.
+    pub half_difference_rad: f64,
+}
+
+impl ZeroUncertainty {
+    /// Of two arms whose zeros are independent of each other and each so unsure, rad.
+    pub fn of_each_arm(zero_rad: f64) -> Self {
+        Self {
+            half_sum_rad: zero_rad / std::f64::consts::SQRT_2,
+            half_difference_rad: zero_rad / std::f64::consts::SQRT_2,
+        }
+    }
+
+    /// Standard uncertainty of one arm's zero, whatever the other one's is, rad.
+    pub fn arm_rad(self) -> f64 {
+        self.half_sum_rad.hypot(self.half_difference_rad)
+    }
+
+    /// Variance of a value that changes by so much for each radian that the light's and the sensor's zero are off.
+    pub fn variance(self, [light, sensor]: [f64; 2]) -> f64 {
+        ((light + sensor) * self.half_sum_rad).powi(2) + ((light - sensor) * self.half_difference_rad).powi(2)
+    }
 }
 
 /// A colour patch as the sensor saw it and as it is.
@@ -101,6 +137,16 @@ pub struct Colour {
     pub matrix: [[f64; 3]; 3],
     /// Root mean square of what is left over the patches, relative to white.
     pub residual: f64,
+    /// Standard uncertainty of what the matrix makes of a reading, relative to its brightest channel, by what is left over
+    /// the patches for each freedom that the matrix leaves; `None` of three patches, which leave none.
+    #[serde(default)]
+    pub u: Option<f64>,
+}
+
+/// Relative standard uncertainties of the gains in certificates that were stored without: the built-in rig file's.
+fn u_gains_built_in() -> [f64; 3] {
+    let known = RigFile::default().uncertainty;
+    Gain::ALL.map(|gain| known.of_gain(gain))
 }
 
 impl White {
@@ -111,20 +157,21 @@ impl White {
             responsivity: file.calibration.responsivity,
             u_responsivity: [file.uncertainty.responsivity; 3],
             gains: Gain::ALL.map(Gain::factor),
+            u_gains: Gain::ALL.map(|gain| file.uncertainty.of_gain(gain)),
             nonlinearity: 0.0,
-            u_nonlinearity: 0.0,
+            u_nonlinearity: file.uncertainty.nonlinearity,
         }
     }
 
-    /// Counts that a linear photometer would have shown, of counts above dark, and by what relative share the
-    /// uncertainty of the non-linearity leaves them unsure.
-    ///
-    /// shown = s · (1 − k s / full scale), solved for s.
-    pub(crate) fn straighten(&self, net: f64, full_scale: f64) -> (f64, f64) {
-        let share = net / full_scale;
-        let root = (1.0 - 4.0 * self.nonlinearity * share).max(0.0).sqrt();
-        // 2 / (1 + root) is (1 − root) / (2 k share) without its 0/0.
-        (net * 2.0 / (1.0 + root), self.u_nonlinearity * share.abs())
+    /// Counts of light that a linear photometer would have shown, of counts above the dark level and of those that the dark
+    /// current shows beside them, and by what relative share the uncertainty of the non-linearity leaves them unsure.
+    pub(crate) fn straighten(&self, net: f64, current: f64, full_scale: f64) -> (f64, f64) {
+        let linearity = Linearity {
+            loss: self.nonlinearity,
+            full_scale,
+        };
+        let (all, dark) = (linearity.signal(net + current), linearity.signal(current));
+        (all - dark, self.u_nonlinearity * linearity.sensitivity(all))
     }
 }
 
@@ -158,11 +205,16 @@ impl Certificate {
         }
     }
 
-    /// Standard uncertainty of an arm's zero, rad.
-    pub fn u_zero(&self, file: &RigFile) -> f64 {
-        self.zero
-            .as_ref()
-            .map_or(file.uncertainty.zero_rad, |zero| zero.u_rad)
+    /// How unsure the zeros of both arms are: as the rig file says, but for their sum where a mirror was measured.
+    pub fn u_zero(&self, file: &RigFile) -> ZeroUncertainty {
+        let known = ZeroUncertainty::of_each_arm(file.uncertainty.zero_rad);
+        match &self.zero {
+            Some(zero) => ZeroUncertainty {
+                half_sum_rad: zero.u_rad,
+                ..known
+            },
+            None => known,
+        }
     }
 
     /// When each part that it has was made, with its name.

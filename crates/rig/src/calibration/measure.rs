@@ -4,9 +4,10 @@ use arms::Pose;
 use glam::{DMat3, DVec3};
 
 use super::certificate::{Certificate, Colour, Conditions, Patch, Trap, White, Zero};
+use super::ladder::Ladder;
 use super::reduction::Reduction;
 use super::{Filling, Taken};
-use crate::{Gain, RigError, RigFile};
+use crate::{RigError, RigFile};
 
 /// Patches span the colours where the determinant of their normal matrix is above this share of its trace, cubed.
 const SINGULAR: f64 = 1e-9;
@@ -20,9 +21,6 @@ pub struct Certified {
     pub reflectance_factor: [f64; 3],
 }
 
-/// Readings of a ladder that are within this share of full scale tell about linearity; the weakest gain sees a white
-/// reference with a hundredth of full scale.
-const LADDER: std::ops::Range<f64> = 0.002..0.97;
 /// A mirror's lobe must be seen over at least so many readings.
 const MIN_LOBE: usize = 5;
 /// Share of the peak below which a reading of a mirror's lobe does not count: the centre of a lobe must not hang on
@@ -46,10 +44,22 @@ impl White {
         before: &Certificate,
     ) -> Result<Self, RigError> {
         let nominal = Reduction::new(file, None, readings, &[]);
-        let mut white = straightness(file, &nominal, ladder)?;
+        let rates = ladder.iter().filter_map(|taken| {
+            let rate = nominal.rate(taken).ok()?;
+            Some((taken.counts.exposure.gain, rate))
+        });
+        let ladder = Ladder::fit(file, &rates.collect::<Vec<_>>())?;
+        let mut white = Self {
+            gains: ladder.gains,
+            u_gains: ladder.u_gains,
+            nonlinearity: ladder.loss,
+            u_nonlinearity: ladder.u_loss,
+            ..Self::nominal(file)
+        };
         let straight = nominal.with_white(white.clone());
         let mut found: Vec<[f64; 3]> = Vec::new();
         let mut tilt: f64 = 0.0;
+        let mut u_photometer = [0.0_f64; 3];
         for (at, taken) in certified {
             for taken in taken {
                 let Ok(rate) = straight.rate(taken) else { continue };
@@ -61,6 +71,10 @@ impl White {
                 };
                 let cosine = arm.cos();
                 tilt = tilt.max(arm.tan().abs());
+                for (c, u) in u_photometer.iter_mut().enumerate() {
+                    let u_gain = rate.u_gain.iter().map(|step| step[c]).fold(0.0, f64::max);
+                    *u = u.max(rate.u_linearity[c].hypot(u_gain));
+                }
                 found.push(std::array::from_fn(|c| {
                     let f = at.reflectance_factor[c] / std::f64::consts::PI;
                     (rate.rgb[c] - stray[c]) / (f * cosine)
@@ -76,70 +90,14 @@ impl White {
         for c in 0..3 {
             let (mean, u) = mean(found.iter().map(|r| r[c]));
             white.responsivity[c] = mean;
-            white.u_responsivity[c] = (u / mean).hypot(u_reference).hypot(tilt * before.u_zero(file));
+            white.u_responsivity[c] = (u / mean)
+                .hypot(u_reference)
+                .hypot(tilt * before.u_zero(file).arm_rad())
+                .hypot(u_photometer[c]);
         }
         white.conditions.temperature_c = temperature_c(readings);
         Ok(white)
     }
-}
-
-/// A reading of the ladder: its share of full scale, counts per time and gain, and the relative variance of those.
-type Rung = (f64, f64, f64);
-
-/// Gains and non-linearity from a ladder of overlapping exposures of one steady light.
-///
-/// Counts per time and gain fall with the counts like 1 − k · counts / full scale. Each gain and channel has a level of
-/// its own; k is one for all, by least squares about the mean of each group, and the levels tell the gains.
-fn straightness(file: &RigFile, nominal: &Reduction<'_>, ladder: &[Taken]) -> Result<White, RigError> {
-    let full_scale = f64::from(file.photometer.full_scale);
-    let group = |gain: Gain, c: usize| -> Vec<Rung> {
-        let of_gain = ladder.iter().filter(|taken| taken.counts.exposure.gain == gain);
-        let rungs = of_gain.filter_map(|taken| {
-            let rate = nominal.rate(taken).ok()?;
-            let share = rate.net[c] / full_scale;
-            let variance = (rate.u_counting[c] / rate.rgb[c]).powi(2);
-            LADDER.contains(&share).then_some((share, rate.rgb[c], variance))
-        });
-        rungs.collect()
-    };
-    let groups = Gain::ALL.map(|gain| [0, 1, 2].map(|c| group(gain, c)));
-    let (mut common, mut spread) = (0.0, 0.0);
-    for rungs in groups.iter().flatten() {
-        let (share, level) = (weighted(rungs, |r| r.0), weighted(rungs, |r| r.1));
-        for &(x, y, variance) in rungs {
-            common += (x - share) * (y / level - 1.0) / variance;
-            spread += (x - share).powi(2) / variance;
-        }
-    }
-    if spread == 0.0 {
-        return Err(RigError::Calibration {
-            what: "ladder of exposures",
-            why: "no two of its readings at one gain lie between 0.2 % and 97 % of full scale".to_owned(),
-        });
-    }
-    let k = -common / spread;
-    let level = |rungs: &[Rung]| weighted(rungs, |r| r.1 / (1.0 - k * r.0));
-    let nominal_gains = Gain::ALL.map(Gain::factor);
-    let gain = |g: usize| {
-        let ratios = (0..3).map(|c| level(&groups[g][c]) / level(&groups[0][c]));
-        let known: Vec<f64> = ratios.filter(|ratio| ratio.is_finite()).collect();
-        match known.len() {
-            0 => nominal_gains[g],
-            n => nominal_gains[g] * known.iter().sum::<f64>() / n as f64,
-        }
-    };
-    Ok(White {
-        gains: [1.0, gain(1), gain(2)],
-        nonlinearity: k,
-        u_nonlinearity: spread.sqrt().recip(),
-        ..White::nominal(file)
-    })
-}
-
-/// Mean of something over the rungs, weighted by their inverse variances; NaN of none.
-fn weighted(rungs: &[Rung], of: impl Fn(&Rung) -> f64) -> f64 {
-    let weights: f64 = rungs.iter().map(|r| 1.0 / r.2).sum();
-    rungs.iter().map(|r| of(r) / r.2).sum::<f64>() / weights
 }
 
 impl Trap {
@@ -269,10 +227,13 @@ impl Colour {
             |patch: &Patch| (matrix * DVec3::from(patch.sensor) - DVec3::from(patch.rgb)).length_squared();
         let squares: f64 = patches.iter().map(left).sum();
         let white = patches.iter().flat_map(|patch| patch.rgb).fold(0.0, f64::max);
+        // Each row of the matrix is three numbers for as many equations as there are patches.
+        let free = 3 * patches.len().saturating_sub(3);
         Ok(Self {
             conditions: Conditions::default(),
             matrix: matrix.transpose().to_cols_array_2d(),
             residual: (squares / (3 * patches.len()) as f64).sqrt() / white,
+            u: (free > 0).then(|| (squares / free as f64).sqrt() / white),
         })
     }
 }

@@ -1,4 +1,4 @@
-use crate::Uncertainties;
+use crate::{Gain, Uncertainties};
 
 /// Counts per µs at gain ×1 and nominal lamp output.
 #[derive(Clone, Copy, Debug, Default)]
@@ -13,6 +13,8 @@ pub(crate) struct Rate {
     pub(super) u_dark: [f64; 3],
     pub(super) u_lamp: f64,
     pub(super) u_linearity: [f64; 3],
+    /// Of each gain step, relative, by step and channel.
+    pub(super) u_gain: [[f64; 3]; 3],
     /// Of the monitor's own noise, relative.
     pub(super) u_monitor: f64,
     /// What the gain step amplifies by.
@@ -53,6 +55,9 @@ impl Rate {
                 mean.net[c] += weight * rate.net[c];
                 mean.u_dark[c] += weight * rate.u_dark[c];
                 mean.u_linearity[c] += weight * rate.u_linearity[c];
+                for (mean, of_step) in mean.u_gain.iter_mut().zip(rate.u_gain) {
+                    mean[c] += weight * of_step[c];
+                }
                 noise += weight * weight * rate.variance(c, best.rgb[c], known);
             }
             mean.u_counting[c] = noise.sqrt();
@@ -62,6 +67,14 @@ impl Rate {
 }
 
 impl Uncertainties {
+    /// Relative standard uncertainty of what a gain step amplifies by; ×1 amplifies nothing.
+    pub fn of_gain(&self, gain: Gain) -> f64 {
+        match gain {
+            Gain::X1 => 0.0,
+            Gain::X16 | Gain::X256 => self.gain,
+        }
+    }
+
     /// Variance of counts above the photometer's offset, taken with a gain: shot noise, converter, rounding.
     pub fn variance(&self, counts: f64, gain: f64) -> f64 {
         let shot = match self.electrons_per_count {

@@ -44,8 +44,19 @@ pub struct Budget {
     pub reference: [f64; 3],
     /// Linearity: the same sign for all readings.
     pub linearity: [f64; 3],
+    /// What each gain step amplifies by, by step: the same share and sign for all readings of a step.
+    pub gain: [[f64; 3]; 3],
+    /// Light of the other colours in a channel, or what the colour matrix leaves over.
+    pub colour: [f64; 3],
     /// Stray light: the same amount of light in all readings.
     pub stray: [f64; 3],
+}
+
+impl Budget {
+    /// Of all gain steps together, which are independent of each other.
+    pub fn all_gains(&self) -> [f64; 3] {
+        std::array::from_fn(|c| self.gain.iter().map(|step| step[c].powi(2)).sum::<f64>().sqrt())
+    }
 }
 
 impl<'a> Reduction<'a> {
@@ -141,6 +152,8 @@ impl<'a> Reduction<'a> {
             drift: relative([rate.u_lamp; 3]),
             reference: relative(self.white.u_responsivity),
             linearity: relative(rate.u_linearity),
+            gain: rate.u_gain.map(|step| std::array::from_fn(|c| step[c] * raw[c])),
+            colour: crosstalk(raw).map(|light| self.file.uncertainty.crosstalk * light),
             stray: scaled(u_stray),
         };
         Ok(self.colour(Reflectance {
@@ -205,13 +218,15 @@ impl<'a> Reduction<'a> {
         let which = (0..3).any(full);
         for c in 0..3 {
             let net = f64::from(counts.rgb[c]) - dark.rgb[c];
-            let (straight, u_linearity) = self.white.straighten(net, full_scale);
+            let current = dark.rgb[c] - dark.offset[c];
+            let (straight, u_linearity) = self.white.straighten(net, current, full_scale);
             rate.rgb[c] = straight * scale;
             rate.net[c] = net;
             rate.full[c] = counts.saturated && (full(c) || !which);
             rate.u_dark[c] = dark.u_rgb[c] * scale;
             rate.u_linearity[c] = u_linearity;
-            rate.current[c] = dark.rgb[c] - dark.offset[c];
+            rate.u_gain[exposure.gain as usize][c] = self.white.u_gains[exposure.gain as usize];
+            rate.current[c] = current;
             rate.u_counting[c] = rate.variance(c, rate.rgb[c], known).sqrt();
         }
         Ok(rate)
@@ -239,17 +254,39 @@ impl<'a> Reduction<'a> {
         };
         let mixed = |of: [f64; 3]| colour.matrix.map(|line| squares(&of, &line));
         let u = sensor.u;
+        let rgb = colour.matrix.map(|line| row(&sensor.raw, &line));
+        let brightest = rgb.into_iter().map(f64::abs).fold(0.0, f64::max);
         Reflectance {
-            rgb: colour.matrix.map(|line| row(&sensor.raw, &line)),
+            rgb,
             u: Budget {
                 counting: mixed(u.counting),
                 dark: mixed(u.dark),
                 drift: mixed(u.drift),
                 reference: mixed(u.reference),
                 linearity: mixed(u.linearity),
+                // All channels of a step are off by one share, so that what is mixed keeps its sign.
+                gain: u.gain.map(|step| colour.matrix.map(|line| row(&step, &line))),
+                colour: match colour.u {
+                    Some(u) => [u * brightest; 3],
+                    // Three patches leave nothing over that would tell how good the matrix is.
+                    None => u.colour,
+                },
                 stray: mixed(u.stray),
             },
             ..sensor
         }
     }
+}
+
+/// Root mean square, for each channel, of what the two other colours have more or less than it, times √(1/2): a share of
+/// its light that comes from each of them, independent of the other, changes the channel by that.
+///
+/// Where a share x of a channel's light comes from the two others in equal parts it changes by x times the difference of
+/// their mean; the formula holds that difference where both are brighter or both are darker than the channel, and more
+/// than it where one is brighter and one darker, since nobody knows that the parts are equal.
+fn crosstalk(raw: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|c| {
+        let squares: f64 = raw.iter().map(|other| (other - raw[c]).powi(2)).sum();
+        (squares / 2.0).sqrt()
+    })
 }

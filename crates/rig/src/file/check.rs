@@ -37,7 +37,9 @@ pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
     };
     let photometer = photometer(source, &raw.photometer)?;
     let calibration = calibration::constants(source, &raw.calibration)?;
-    let visits = calibration::visits(source, &raw.calibration, &envelope)?;
+    let uncertainty = calibration::uncertainty(source, &raw.uncertainty)?;
+    let margin_rad = uncertainty.shadow_margin_rad();
+    let visits = calibration::visits(source, &raw.calibration, &envelope, margin_rad)?;
     monitored(source, &raw.photometer, &photometer, &calibration, &visits)?;
     for (key, id, others) in [
         ("sensor.id", &raw.sensor.id, vec![light.id]),
@@ -56,7 +58,7 @@ pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
         visits,
         certificates: calibration::certificates(source, &raw.calibration)?,
         suspend: suspend::suspend(source, &raw.suspend)?,
-        uncertainty: calibration::uncertainty(source, &raw.uncertainty)?,
+        uncertainty,
         fingerprint: source.fingerprint(RigFile::BUILT_IN)?,
         envelope,
         sim: raw.sim,

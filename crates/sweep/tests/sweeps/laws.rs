@@ -21,6 +21,7 @@ prop_compose! {
         grid_rad in prop::array::uniform2(-1e-3..1e-3_f64),
         start in prop::option::of((-39.0..-16.0_f64, 16.0..39.0_f64)),
         swapped: bool,
+        unsure_rad in (0.0..5e-3_f64, 1e-3..5e-3_f64),
     ) -> Mechanics {
         let mut mechanics = mechanics();
         mechanics.envelope.light = light;
@@ -28,6 +29,7 @@ prop_compose! {
         mechanics.envelope.separation_rad = separation_deg.to_radians();
         mechanics.envelope.can_pass = can_pass;
         mechanics.approach = approach;
+        (mechanics.margin_rad, mechanics.tolerance_rad) = unsure_rad;
         mechanics.resolution_rad = mechanics.resolution_rad.map(|rad| rad / gear);
         mechanics.grid_rad = grid_rad;
         mechanics.start = start.map(|(a, b)| if swapped { Pose::from_deg(b, a) } else { Pose::from_deg(a, b) });
@@ -88,7 +90,30 @@ proptest! {
                 from = to;
             }
             prop_assert_eq!(mechanics.envelope.check_pose(step.pose()), Ok(()));
-            prop_assert!(!step.lamp || !mechanics.envelope.occluded(step.pose()), "step {} is in shadow", step.index);
+            // Wherever the arms come to rest for it, and wherever they really are then.
+            let clearance = mechanics.envelope.clearance_rad(step.pose(), [2.0 * mechanics.tolerance_rad; 2]);
+            prop_assert!(!step.lamp || clearance >= mechanics.margin_rad, "step {} is in shadow", step.index);
+        }
+    }
+
+    /// What is collected evenly about each pose of a flight, within its cell, is collected clear of the shadow.
+    #[test]
+    fn prop_a_cell_keeps_clear_of_the_shadow(job in jobs(), mechanics in rigs()) {
+        let plan = possible(&Job { mode: Mode::Fly, ..job }, &mechanics)?;
+        let margin_rad = mechanics.margin_rad + mechanics.tolerance_rad;
+        for flight in plan.steps.chunk_by(|a, b| a.pass == b.pass).filter(|of| of[0].pass.is_some() && of[0].lamp) {
+            let poses: Vec<Pose> = flight.iter().map(|step| step.pose()).collect();
+            let (first, last) = (poses[0], poses[poses.len() - 1]);
+            let way = |arm: Arm| (last.angle(arm) - first.angle(arm)).abs();
+            let lead = if way(Arm::Light) >= way(Arm::Sensor) { Arm::Light } else { Arm::Sensor };
+            for (pose, [low, high]) in poses.iter().zip(sweep::cells(&poses, lead, &mechanics.envelope, margin_rad)) {
+                let along = (pose.angle(lead) - first.angle(lead)).abs();
+                prop_assert!(low <= along && along <= high);
+                let swept = Arm::BOTH.map(|arm| if way(arm) > 0.0 { high - low } else { 0.0 });
+                let clearance = mechanics.envelope.clearance_rad(*pose, swept);
+                prop_assert!(clearance >= margin_rad - 1e-12, "{clearance} rad clear at {pose:?}");
+                prop_assert!(high - low > 0.0, "no light can be collected at {pose:?}");
+            }
         }
     }
 

@@ -30,6 +30,7 @@ fn mechanics() -> Mechanics {
             can_pass: false,
         },
         margin_rad: 0.0,
+        tolerance_rad: 0.0,
         profiles: [profile; 2],
         resolution_rad: [TAU / 4096.0; 2],
         grid_rad: [0.0; 2],

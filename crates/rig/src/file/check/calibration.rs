@@ -45,6 +45,7 @@ pub(super) fn visits(
     source: &Source<'_>,
     raw: &RawCalibration,
     envelope: &Envelope,
+    margin_rad: f64,
 ) -> Result<Visits, RigError> {
     let minutes = |key: &str, value: &Spanned<f64>, least: f64| {
         let minutes = source.within(&format!("calibration.{key}"), value, least..=DAY_MIN)?;
@@ -65,7 +66,8 @@ pub(super) fn visits(
             sensor: degrees("reference_sensor_deg", &raw.reference_sensor_deg)?,
         },
     };
-    let reachable = envelope.check_pose(visits.reference).is_ok() && !envelope.occluded(visits.reference);
+    let clear = envelope.clearance_rad(visits.reference, [0.0; 2]) >= margin_rad;
+    let reachable = envelope.check_pose(visits.reference).is_ok() && clear;
     if visits.lamp == Lamp::Visits && !reachable {
         return Err(source.refuse(
             "calibration.reference_light_deg",
@@ -95,10 +97,15 @@ pub(super) fn uncertainty(source: &Source<'_>, raw: &RawUncertainty) -> Result<U
         source.within(&format!("uncertainty.{key}"), value, 0.0..=max)
     };
     let radians = |key: &str, value: &Spanned<f64>| within(key, value, 10.0).map(f64::to_radians);
+    let percent =
+        |key: &str, value: &Spanned<f64>, max: f64| within(key, value, max).map(|value| value / 100.0);
     Ok(Uncertainties {
         electrons_per_count: within("electrons_per_count", &raw.electrons_per_count, 1e6)?,
         read_noise_counts: within("read_noise_counts", &raw.read_noise_counts, 1e4)?,
-        responsivity: within("responsivity_percent", &raw.responsivity_percent, 100.0)? / 100.0,
+        responsivity: percent("responsivity_percent", &raw.responsivity_percent, 100.0)?,
+        gain: percent("gain_percent", &raw.gain_percent, 100.0)?,
+        nonlinearity: percent("nonlinearity_percent", &raw.nonlinearity_percent, 20.0)?,
+        crosstalk: percent("crosstalk_percent", &raw.crosstalk_percent, 50.0)?,
         stray_per_sr: within("stray_per_sr", &raw.stray_per_sr, 1.0)?,
         angle_rad: radians("angle_deg", &raw.angle_deg)?,
         zero_rad: radians("zero_deg", &raw.zero_deg)?,
