@@ -9,8 +9,8 @@ use arms::{Arm, ArmAngle};
 use firmware_sim::in_process::{InProcessRig, SharedBench};
 use firmware_sim::{Disturbance, Fault};
 use goniod::{
-    Action, Behaviour, Caller, Daemon, FaultId, JobState, Memory, OpenRig, RigSource, Settings, Submission,
-    WorkerPlace,
+    Action, Behaviour, Caller, Daemon, FaultId, JobId, JobState, Memory, OpenRig, RigSource, Settings,
+    Submission, WorkerPlace,
 };
 use rig::{Drive, RigFile};
 use session::SessionError;
@@ -171,11 +171,14 @@ impl World {
             });
         };
         tokio::spawn(async move {
+            // Which job is meant is looked up first, by a request of its own that a store may hold up: the request that is
+            // judged comes in after that.
+            let job = chosen(&daemon, op).await;
             mark(What::Asked {
                 op,
                 fault: named.clone(),
             });
-            let answer = ask(&daemon, op, named.clone()).await;
+            let answer = ask(&daemon, op, named.clone(), job).await;
             mark(match answer {
                 Ok(pressed) => What::Answered {
                     op,
@@ -187,8 +190,28 @@ impl World {
     }
 }
 
-/// Asks; returns the fault that was latched by it.
-async fn ask(daemon: &Daemon, op: Op, named: Option<FaultId>) -> Result<Option<FaultId>, String> {
+/// The job that an operator means who starts, resumes or cancels one.
+async fn chosen(daemon: &Daemon, op: Op) -> Option<JobId> {
+    let fits = |state: JobState| match op {
+        Op::Ready => matches!(state, JobState::Queued | JobState::AwaitingSpecimen),
+        Op::Resume => state == JobState::Interrupted,
+        Op::Cancel => !state.over(),
+        _ => false,
+    };
+    if !matches!(op, Op::Ready | Op::Resume | Op::Cancel) {
+        return None;
+    }
+    let jobs = daemon.jobs().await.ok()?;
+    jobs.iter().find(|job| fits(job.state)).map(|job| job.id)
+}
+
+/// Asks; returns the fault that was latched by it. Where no job fits, nothing is asked.
+async fn ask(
+    daemon: &Daemon,
+    op: Op,
+    named: Option<FaultId>,
+    job: Option<JobId>,
+) -> Result<Option<FaultId>, String> {
     let by = Caller {
         name: "operator".to_owned(),
     };
@@ -209,9 +232,9 @@ async fn ask(daemon: &Daemon, op: Op, named: Option<FaultId>) -> Result<Option<F
             };
             daemon.submit(&by, submission).await.map(drop)
         }
-        Op::Ready => act(daemon, &by, Action::Ready).await,
-        Op::Resume => act(daemon, &by, Action::Resume).await,
-        Op::Cancel => act(daemon, &by, Action::Cancel).await,
+        Op::Ready => act(daemon, &by, job, Action::Ready).await,
+        Op::Resume => act(daemon, &by, job, Action::Resume).await,
+        Op::Cancel => act(daemon, &by, job, Action::Cancel).await,
         Op::Jog => daemon.jog(&by, Arm::Light, ArmAngle::from_deg(-20.0)).await,
         Op::Park => daemon.park(&by).await,
         _ => unreachable!("it is asked of nobody"),
@@ -219,15 +242,14 @@ async fn ask(daemon: &Daemon, op: Op, named: Option<FaultId>) -> Result<Option<F
     done.map(|()| None).map_err(|refusal| refusal.why)
 }
 
-async fn act(daemon: &Daemon, by: &Caller, action: Action) -> Result<(), goniod::Refusal> {
-    let jobs = daemon.jobs().await?;
-    let fits = |state| match action {
-        Action::Ready => matches!(state, JobState::Queued | JobState::AwaitingSpecimen),
-        Action::Resume => state == JobState::Interrupted,
-        Action::Cancel => !state.over(),
-    };
-    let Some(job) = jobs.iter().find(|job| fits(job.state)) else {
-        return Ok(());
-    };
-    daemon.act(by, job.id, action).await.map(drop)
+async fn act(
+    daemon: &Daemon,
+    by: &Caller,
+    job: Option<JobId>,
+    action: Action,
+) -> Result<(), goniod::Refusal> {
+    match job {
+        Some(job) => daemon.act(by, job, action).await.map(drop),
+        None => Ok(()),
+    }
 }
