@@ -14,6 +14,7 @@ use crate::mishaps::Mishaps;
 use crate::optics::Optics;
 use crate::photodiodes::{Exposed, Light, Photodiodes};
 use crate::photometer::{Integration, Photometer};
+use crate::room::Room;
 use crate::servo::{Model, Servo};
 use crate::{Clock, Device, Fault, Mishap, Settings, SimError, baud, photometer, servo};
 
@@ -211,6 +212,11 @@ impl Bench {
         Ok(())
     }
 
+    /// Somebody switches off the light of the room and closes the door: what shines from outside ends.
+    pub fn darken(&mut self) {
+        self.photometer.darken();
+    }
+
     fn put(&mut self, fault: Fault) {
         match fault.device {
             rig::Device::Light => self.servos[0].schedule(fault.at, fault.what),
@@ -240,6 +246,7 @@ impl Bench {
         let light = Light {
             signal: self.collect(from_s, to_s),
             lamp_s: self.photometer.lamp().integral(from_s, to_s),
+            room_s: self.photometer.room().integral(from_s, to_s),
             duration_s: to_s - from_s,
             gain: rig::Gain::ALL[usize::from(integration.gain_step)].factor(),
             temperature_c: self.photometer.temperature_c((from_s + to_s) / 2.0),
@@ -297,7 +304,14 @@ fn photometer(rig: &RigFile, settings: &Settings, baud_code: u8) -> Photometer {
     };
     let lamp = Lamp::new(warm_up_s, amounts.lamp_drift, amounts.lamp_flicker, &mut once)
         .with_trend(amounts.lamp_trend_per_h);
-    Photometer::new(fitting, lamp)
+    let mut room = Room::default();
+    room.light(
+        0.0,
+        f64::INFINITY,
+        amounts.room_light_per_sr,
+        amounts.room_flicker_hz,
+    );
+    Photometer::new(fitting, lamp, room)
 }
 
 fn fitting(rig: &RigFile, settings: &Settings, arm: Arm, baud_code: u8) -> Result<servo::Fitting, SimError> {

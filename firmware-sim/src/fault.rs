@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Something that goes wrong with a device at a given moment of simulated time.
 ///
 /// In TOML `{ device = "sensor", at_s = 3.5, what = { stall_s = 0.2 } }`; without `at_s` at once.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fault {
     /// Which device.
@@ -19,8 +19,8 @@ pub struct Fault {
 }
 
 /// What goes wrong.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", from = "Spelling")]
 #[non_exhaustive]
 pub enum Disturbance {
     /// The device neither hears nor answers for so long; what it was doing goes on.
@@ -48,11 +48,55 @@ pub enum Disturbance {
     /// So much light gets in from outside for so long that every channel is full.
     #[serde(rename = "glare_s", with = "seconds")]
     Glare(Duration),
+    /// Light of the room reaches the photometer for so long, too little to fill a channel; beside that of the table
+    /// `[sim]` and of other faults.
+    RoomLight(RoomLight),
     /// The door at the photometer's contact is open for so long.
     #[serde(rename = "door_s", with = "seconds")]
     Door(Duration),
     /// The device answers under this id from now on, as one that was set up wrongly.
     Id(u8),
+}
+
+/// Light that reaches the photometer whether the lamp is on or not, for a while. The lamp monitor does not see it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RoomLight {
+    /// Its mean, as the f·cos that gives as much with the lamp at nominal output, sr⁻¹, 0 … 100.
+    #[serde(deserialize_with = "level")]
+    pub per_sr: f64,
+    /// How often a second it swells to twice its mean and fades to nothing, Hz, 0 … 10000; 0: it is steady.
+    #[serde(default, deserialize_with = "flicker")]
+    pub flicker_hz: f64,
+    /// For how long.
+    #[serde(rename = "for_s", with = "seconds")]
+    pub duration: Duration,
+}
+
+impl RoomLight {
+    /// Brightest light, sr⁻¹.
+    pub const MAX_PER_SR: f64 = 100.0;
+    /// Fastest flicker, Hz.
+    pub const MAX_FLICKER_HZ: f64 = 10_000.0;
+}
+
+fn level<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    within(from, "per_sr", RoomLight::MAX_PER_SR)
+}
+
+fn flicker<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    within(from, "flicker_hz", RoomLight::MAX_FLICKER_HZ)
+}
+
+/// A number from 0 to a largest one; NaN is in no range.
+fn within<'de, D: serde::Deserializer<'de>>(from: D, key: &str, max: f64) -> Result<f64, D::Error> {
+    let value = f64::deserialize(from)?;
+    match (0.0..=max).contains(&value) {
+        true => Ok(value),
+        false => Err(serde::de::Error::custom(format!(
+            "{key} is {value}, allowed: 0 … {max}"
+        ))),
+    }
 }
 
 impl Disturbance {
@@ -64,6 +108,54 @@ impl Disturbance {
     pub const OVERHEATING: Self = Self::HardwareError(1 << 2);
     /// Supply voltage: a servo goes on with its Alert bit set.
     pub const ALERT: Self = Self::HardwareError(1);
+}
+
+/// How a file may spell what goes wrong: as it is written, and hardware errors by the names that they have by chance.
+#[derive(Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Spelling {
+    #[serde(rename = "silence_s", with = "seconds")]
+    Silence(Duration),
+    HardwareError(u8),
+    Overload,
+    Overheating,
+    Alert,
+    #[serde(rename = "stall_s", with = "seconds")]
+    Stall(Duration),
+    RefusedTrigger,
+    LostAcknowledgement,
+    Reboot,
+    WatchdogTrip,
+    #[serde(rename = "sag_s", with = "seconds")]
+    Sag(Duration),
+    #[serde(rename = "glare_s", with = "seconds")]
+    Glare(Duration),
+    RoomLight(RoomLight),
+    #[serde(rename = "door_s", with = "seconds")]
+    Door(Duration),
+    Id(u8),
+}
+
+impl From<Spelling> for Disturbance {
+    fn from(spelling: Spelling) -> Self {
+        match spelling {
+            Spelling::Silence(time) => Self::Silence(time),
+            Spelling::HardwareError(bits) => Self::HardwareError(bits),
+            Spelling::Overload => Self::OVERLOAD,
+            Spelling::Overheating => Self::OVERHEATING,
+            Spelling::Alert => Self::ALERT,
+            Spelling::Stall(time) => Self::Stall(time),
+            Spelling::RefusedTrigger => Self::RefusedTrigger,
+            Spelling::LostAcknowledgement => Self::LostAcknowledgement,
+            Spelling::Reboot => Self::Reboot,
+            Spelling::WatchdogTrip => Self::WatchdogTrip,
+            Spelling::Sag(time) => Self::Sag(time),
+            Spelling::Glare(time) => Self::Glare(time),
+            Spelling::RoomLight(light) => Self::RoomLight(light),
+            Spelling::Door(time) => Self::Door(time),
+            Spelling::Id(id) => Self::Id(id),
+        }
+    }
 }
 
 /// Disturbances to come, earliest first.

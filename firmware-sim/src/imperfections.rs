@@ -18,6 +18,10 @@ pub struct Imperfections {
     pub self_heating_c: f64,
     /// Light that reaches the sensor past the specimen while the lamp is on, as f·cos, sr⁻¹.
     pub stray_per_sr: f64,
+    /// Light that reaches the sensor from the room, whether the lamp is on or not, as f·cos, sr⁻¹.
+    pub room_light_per_sr: f64,
+    /// How often a second it swells to twice its mean and fades to nothing, Hz; 0: it is steady.
+    pub room_flicker_hz: f64,
     /// Time constant with which the lamp comes up.
     pub lamp_warm_up: Duration,
     /// Largest slow deviation from nominal output, relative.
@@ -61,6 +65,8 @@ impl Imperfections {
         dark_offset_counts: 64.0,
         self_heating_c: 3.0,
         stray_per_sr: 1e-5,
+        room_light_per_sr: 0.0,
+        room_flicker_hz: 0.0,
         lamp_warm_up: Duration::from_millis(20),
         lamp_drift: 0.005,
         lamp_flicker: 0.001,
@@ -87,6 +93,8 @@ impl Imperfections {
         dark_offset_counts: 0.0,
         self_heating_c: 0.0,
         stray_per_sr: 0.0,
+        room_light_per_sr: 0.0,
+        room_flicker_hz: 0.0,
         lamp_warm_up: Duration::ZERO,
         lamp_drift: 0.0,
         lamp_flicker: 0.0,

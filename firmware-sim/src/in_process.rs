@@ -185,6 +185,11 @@ impl SharedBench {
         self.lock().device(device).reboot();
     }
 
+    /// Somebody switches off the light of the room and closes the door: what shines from outside ends.
+    pub fn darken(&self) {
+        self.lock().darken();
+    }
+
     /// Reads a register past the bus, as a debugger would: the device does not notice.
     ///
     /// # Errors

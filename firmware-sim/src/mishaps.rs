@@ -5,12 +5,16 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use crate::{Disturbance, Fault, SimError};
+use crate::{Disturbance, Fault, RoomLight, SimError};
 
 /// Stream of random numbers for what happens by chance; readings use the streams 0, 1, …
 const STREAM: u64 = u64::MAX - 1;
 /// Most mishaps of one kind, per hour: one a second.
 const RATE_MAX_PER_H: f64 = 3600.0;
+
+/// Lights of a room by chance, f·cos in sr⁻¹, and their flicker: twice the frequency of the mains.
+const ROOM_PER_SR: [f64; 5] = [1e-4, 1e-3, 1e-2, 0.1, 1.0];
+const ROOM_FLICKER_HZ: [f64; 3] = [0.0, 100.0, 120.0];
 
 /// What happens to devices by chance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -38,11 +42,16 @@ pub enum Mishap {
     WatchdogTrip,
     /// The supply sinks for 0.1 s to 5 s, not so far that a device complains.
     Sag,
+    /// So much light gets in for 0.1 s to 3 s that every channel is full.
+    Glare,
+    /// The light of the room is switched on and stays on for an hour, steady or flickering with the mains: 0.0001 to
+    /// 1 sr⁻¹ of f·cos.
+    RoomLight,
 }
 
 impl Mishap {
     /// All kinds.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 13] = [
         Self::Hiccup,
         Self::Silence,
         Self::Overload,
@@ -54,6 +63,8 @@ impl Mishap {
         Self::Reboot,
         Self::WatchdogTrip,
         Self::Sag,
+        Self::Glare,
+        Self::RoomLight,
     ];
 
     /// One of its kind, to happen to some device at a time.
@@ -71,9 +82,17 @@ impl Mishap {
             Self::Reboot => Disturbance::Reboot,
             Self::WatchdogTrip => Disturbance::WatchdogTrip,
             Self::Sag => Disturbance::Sag(ms(100..5000)),
+            Self::Glare => Disturbance::Glare(ms(100..3000)),
+            Self::RoomLight => Disturbance::RoomLight(RoomLight {
+                per_sr: ROOM_PER_SR[random.random_range(0..ROOM_PER_SR.len())],
+                flicker_hz: ROOM_FLICKER_HZ[random.random_range(0..ROOM_FLICKER_HZ.len())],
+                duration: Duration::from_secs(3600),
+            }),
         };
         let device = match self {
-            Self::RefusedTrigger | Self::LostAcknowledgement => rig::Device::Photometer,
+            Self::RefusedTrigger | Self::LostAcknowledgement | Self::Glare | Self::RoomLight => {
+                rig::Device::Photometer
+            }
             Self::Sag => [rig::Device::Light, rig::Device::Sensor][random.random_range(0..2)],
             _ => {
                 [rig::Device::Light, rig::Device::Sensor, rig::Device::Photometer][random.random_range(0..3)]

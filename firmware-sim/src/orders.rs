@@ -21,8 +21,8 @@ impl std::str::FromStr for Order {
     type Err = SimError;
 
     fn from_str(line: &str) -> Result<Self, SimError> {
-        toml::from_str(line).map_err(|error| SimError::Form {
-            why: error.to_string().trim_end().replace('\n', " "),
+        config::parse(line).map_err(|flaws| SimError::Form {
+            why: flaws.to_string(),
         })
     }
 }

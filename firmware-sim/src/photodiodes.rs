@@ -16,6 +16,8 @@ pub(crate) struct Light {
     pub(crate) signal: DVec3,
     /// ∫ lamp dt, s.
     pub(crate) lamp_s: f64,
+    /// ∫ light of the room dt, s/sr.
+    pub(crate) room_s: f64,
     pub(crate) duration_s: f64,
     pub(crate) gain: f64,
     pub(crate) temperature_c: f64,
@@ -42,7 +44,7 @@ pub(crate) struct Photodiodes {
 impl Photodiodes {
     /// Counts of the `serial`-th integration: its noise depends on nothing but that number and the seed.
     ///
-    /// Mean counts of a channel are gain · (responsivity · (signal + stray · lamp) + dark · time); electrons are
+    /// Mean counts of a channel are gain · (responsivity · (signal + stray · lamp + room) + dark · time); electrons are
     /// Poisson, read noise is normal. The monitor has neither gain, dark signal nor offset. Responsivity, gain, linearity
     /// and colours are off by the stated errors.
     pub(crate) fn expose(&self, light: Light, serial: u64) -> Exposed {
@@ -71,8 +73,10 @@ impl Photodiodes {
         };
         let full_scale = f64::from(self.full_scale);
         let channel = |(responsivity, signal): (f64, f64)| {
-            let lit =
-                responsivity * (1.0 + responsivity_error) * 1e6 * (signal + stray_per_sr * light.lamp_s);
+            let lit = responsivity
+                * (1.0 + responsivity_error)
+                * 1e6
+                * (signal + stray_per_sr * light.lamp_s + light.room_s);
             let noisy = gain * shot(lit + dark, electrons, &mut random);
             // Beyond the top of the parabola, where every reading is full, the counts shown go on growing.
             let lost = (nonlinearity * noisy / full_scale).min(0.5);
@@ -138,6 +142,7 @@ mod tests {
         Light {
             signal: DVec3::splat(signal * 0.1),
             lamp_s: 0.1,
+            room_s: 0.0,
             duration_s: 0.1,
             gain,
             temperature_c: 25.0,

@@ -12,6 +12,7 @@ use crate::fault::Disturbance;
 use crate::lamp::Lamp;
 use crate::node::Node;
 use crate::photodiodes::Exposed;
+use crate::room::Room;
 use crate::table::Table;
 
 /// Values of Status.
@@ -46,6 +47,7 @@ pub(crate) struct Photometer {
     fitting: Fitting,
     node: Node,
     lamp: Lamp,
+    room: Room,
     /// When its clock read 0.
     booted: Duration,
     glare_until: Duration,
@@ -58,12 +60,13 @@ pub(crate) struct Photometer {
 }
 
 impl Photometer {
-    pub(crate) fn new(fitting: Fitting, lamp: Lamp) -> Self {
+    pub(crate) fn new(fitting: Fitting, lamp: Lamp, room: Room) -> Self {
         let table = Table::new(reg::REGISTERS.to_vec());
         Self {
             node: Node::new(table, fitting.id, fitting.baud_code),
             fitting,
             lamp,
+            room,
             booted: Duration::ZERO,
             glare_until: Duration::ZERO,
             door_until: Duration::ZERO,
@@ -77,6 +80,16 @@ impl Photometer {
 
     pub(crate) fn lamp(&self) -> &Lamp {
         &self.lamp
+    }
+
+    pub(crate) fn room(&self) -> &Room {
+        &self.room
+    }
+
+    /// Ends all light from outside.
+    pub(crate) fn darken(&mut self) {
+        self.glare_until = self.node.now.min(self.glare_until);
+        self.room.darken(self.node.now.as_secs_f64());
     }
 
     pub(crate) fn integration(&self) -> Option<Integration> {
@@ -160,6 +173,11 @@ impl Photometer {
             }
             Disturbance::Door(duration) => self.door_until = self.node.now + duration,
             Disturbance::Glare(duration) => self.glare_until = self.node.now + duration,
+            Disturbance::RoomLight(light) => {
+                let now_s = self.node.now.as_secs_f64();
+                let to_s = now_s + light.duration.as_secs_f64();
+                self.room.light(now_s, to_s, light.per_sr, light.flicker_hz);
+            }
             Disturbance::Id(id) => self.node.rename(id),
             // A servo's.
             Disturbance::Sag(_) => {}
@@ -229,5 +247,6 @@ impl Photometer {
     /// Lets go of light that went out before a moment.
     pub(crate) fn forget(&mut self, before_s: f64) {
         self.lamp.forget(before_s);
+        self.room.forget(before_s);
     }
 }

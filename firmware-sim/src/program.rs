@@ -44,7 +44,7 @@ struct Arguments {
 /// Runs `firmware-sim` with the arguments of this process: serves until SIGINT or SIGTERM, then returns 0; 2 for bad
 /// arguments or a bad rig file.
 pub fn main() -> ExitCode {
-    let arguments = match terminal::arguments() {
+    let arguments = match terminal::arguments(|_| {}) {
         Ok(arguments) => arguments,
         Err(code) => return code,
     };

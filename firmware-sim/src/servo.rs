@@ -173,6 +173,7 @@ impl Servo {
             Disturbance::RefusedTrigger
             | Disturbance::LostAcknowledgement
             | Disturbance::Glare(_)
+            | Disturbance::RoomLight(_)
             | Disturbance::Door(_) => {}
         }
     }

@@ -75,6 +75,8 @@ struct Raw {
     dark_offset_counts: Option<f64>,
     self_heating_c: Option<f64>,
     stray_per_sr: Option<f64>,
+    room_light_per_sr: Option<f64>,
+    room_flicker_hz: Option<f64>,
     lamp_warm_up_ms: Option<f64>,
     lamp_drift: Option<f64>,
     lamp_flicker: Option<f64>,
@@ -98,14 +100,7 @@ impl Settings {
     /// # Errors
     /// An unknown key, a wrong type, a value out of its range, a start that the envelope forbids.
     pub fn new(rig: &RigFile) -> Result<Self, SimError> {
-        let raw: Raw = rig
-            .sim
-            .clone()
-            .try_into()
-            .map_err(|error: toml::de::Error| SimError::Form {
-                // The message alone lacks the key; the error's text has it in a line of its own.
-                why: error.to_string().trim_end().replace('\n', " "),
-            })?;
+        let raw: Raw = read(&rig.sim).map_err(|why| SimError::Form { why })?;
         let park = rig.motion.park;
         let start = Pose::from_deg(
             within(
@@ -138,6 +133,12 @@ impl Settings {
     }
 }
 
+/// Reads a table that was taken out of its file into a type. The error names every key that the type does not know.
+pub(crate) fn read<T: serde::de::DeserializeOwned>(table: &toml::Table) -> Result<T, String> {
+    // Its lines are not those of the file, and are not told.
+    config::parse(&table.to_string()).map_err(|flaws| flaws.to_string())
+}
+
 fn imperfections(raw: &Raw) -> Result<Imperfections, SimError> {
     let base = match raw.imperfections {
         None | Some(Preset::Default) => Imperfections::DEFAULT,
@@ -159,6 +160,8 @@ fn imperfections(raw: &Raw) -> Result<Imperfections, SimError> {
         dark_offset_counts: read!(amount dark_offset_counts to 1e5),
         self_heating_c: read!(amount self_heating_c to 50.0),
         stray_per_sr: read!(amount stray_per_sr to 1.0),
+        room_light_per_sr: read!(amount room_light_per_sr to 100.0),
+        room_flicker_hz: read!(amount room_flicker_hz to 10_000.0),
         lamp_warm_up: ms(
             "lamp_warm_up_ms",
             raw.lamp_warm_up_ms,

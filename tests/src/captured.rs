@@ -2,10 +2,10 @@ use std::path::{Path, PathBuf};
 
 use brdf::Brdf;
 use capture::{FileJournal, Reading, Record, extended_plan};
-use pdv::{Observation, Separable};
+use pdv::{Model, Observation, Separable};
 use report::{Measurement, measurements, observations};
 use rig::RigFile;
-use sweep::Sweep;
+use sweep::{Job, Sweep};
 
 /// What a run left behind, read back through the libraries.
 pub struct Captured {
@@ -53,13 +53,18 @@ impl Captured {
         accepted
     }
 
-    /// The separable model of what was measured.
+    /// The model that the run's job asks for, of what was measured.
     ///
     /// # Panics
     /// If the readings make none.
-    pub fn model(&self) -> Separable {
-        let [plane, arc] = [Sweep::Plane(0), Sweep::Arc].map(|sweep| observations(&self.measurements, sweep));
-        Separable::from_observations(&plane, &arc).expect("enough readings")
+    pub fn model(&self) -> Box<dyn Model> {
+        let Some(Record::Header(header)) = self.records.first() else {
+            panic!("the journal begins with a header");
+        };
+        let job = Job::parse(&header.job, "job").expect("the run's job is sound");
+        let of = |sweep| observations(&self.measurements, sweep);
+        let planes: Vec<_> = (0..job.planes.len()).map(|i| of(Sweep::Plane(i))).collect();
+        report::model(job.model, &planes, &of(Sweep::Arc)).expect("enough readings")
     }
 
     /// The separable model of a material sampled directly, without any instrument, at the run's measured angles.

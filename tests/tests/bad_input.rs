@@ -27,7 +27,7 @@ struct Case {
     says: &'static [&'static str],
 }
 
-const CASES: [Case; 13] = [
+const CASES: [Case; 12] = [
     Case {
         name: "unknown key in the job",
         job: "speciment = \"x\"\n[[plane]]\ntheta_r_deg = 70.0\nreadings = 10\n",
@@ -100,12 +100,6 @@ const CASES: [Case; 13] = [
         rig: "[bus]\nport = \"sim\"\n[sim]\nspecimen = \"./none.binary\"\n",
         says: &["rig.toml", "sim.specimen", "none.binary"],
     },
-    Case {
-        name: "missing port",
-        job: JOB,
-        rig: "[bus]\nport = \"/dev/tty-no-such-port\"\n",
-        says: &["bus.port", "/dev/tty-no-such-port"],
-    },
 ];
 
 /// Runs the job of a case; asserts that nothing moved, no run was begun, and no directory was left behind.
@@ -155,10 +149,160 @@ fn a_port_in_use_is_refused() {
     let port = simulator.server.path().display().to_string();
     let _held = serialport::new(&port, 1_000_000).open_native().unwrap();
     let arguments = ["run", "job.toml", "--rig", "rig.toml"];
-    let finished = run(GONIOCTL, temporary.path(), &arguments).expect(2);
+    let finished = run(GONIOCTL, temporary.path(), &arguments).expect(3);
     assert!(finished.stderr.contains(&port), "{}", finished.stderr);
     assert!(finished.stderr.contains("in use"), "{}", finished.stderr);
     assert_eq!(simulator.server.counters().goals, 0);
+}
+
+#[test]
+fn a_port_that_cannot_be_used_ends_every_command_that_needs_it_with_3() {
+    let temporary = tempfile::tempdir().unwrap();
+    fs::write(temporary.path().join("job.toml"), JOB).unwrap();
+    // Missing, and there but no serial port.
+    for port in ["/dev/tty-no-such-port", "/dev/null"] {
+        fs::write(
+            temporary.path().join("rig.toml"),
+            format!("bus.port = \"{port}\"\n"),
+        )
+        .unwrap();
+        for command in [
+            &["run", "job.toml"][..],
+            &["doctor"],
+            &["conform"],
+            &["calibrate", "mirror"],
+        ] {
+            let arguments = [command, &["--rig", "rig.toml"]].concat();
+            let finished = run(GONIOCTL, temporary.path(), &arguments).expect(3);
+            let said = [finished.stdout, finished.stderr].concat();
+            assert!(said.contains(port), "{command:?}: {said}");
+        }
+    }
+    let runs = fs::read_dir(temporary.path().join("runs")).map_or(0, Iterator::count);
+    assert_eq!(runs, 0, "a run was begun");
+}
+
+#[test]
+fn with_json_every_error_is_an_object_on_stdout() {
+    let temporary = tempfile::tempdir().unwrap();
+    let here = temporary.path();
+    fs::write(here.join("job.toml"), JOB).unwrap();
+    fs::write(here.join("bad.toml"), "speciment = 1").unwrap();
+    fs::write(here.join("rig.toml"), "bus.port = \"/dev/tty-no-such-port\"\n").unwrap();
+    let nobody = "unix:nobody.sock";
+    for (arguments, code) in [
+        (&["run", "bad.toml"][..], 2),
+        (&["run", "none.toml"], 2),
+        (&["run", "--resume", "none"], 2),
+        (&["run", "job.toml", "--rig", "rig.toml"], 3),
+        (&["plan", "bad.toml"], 2),
+        (&["eval", "no-such-brdf", "lambert:0.5"], 2),
+        (&["reconstruct", "none"], 2),
+        (&["doctor", "--rig", "bad.toml"], 2),
+        (&["jobs", "--daemon", nobody], 5),
+        (&["watch", "--daemon", nobody], 5),
+        (&["run", "job.toml", "--no-such-option"], 2),
+        (&["jobs", "--daemon"], 2),
+    ] {
+        let plain = run(GONIOCTL, here, arguments).expect(code);
+        assert_eq!(plain.stdout, "", "{arguments:?}");
+        let finished = run(GONIOCTL, here, &[arguments, &["--json"]].concat()).expect(code);
+        let object: serde_json::Value = serde_json::from_str(&finished.stdout)
+            .unwrap_or_else(|error| panic!("{arguments:?}: {error}: {:?}", finished.stdout));
+        assert_eq!(object["exit_status"], code, "{arguments:?}: {object}");
+        assert!(
+            object["error"].as_str().is_some_and(|text| !text.is_empty()),
+            "{object}"
+        );
+        assert!(!finished.stderr.is_empty(), "{arguments:?}");
+    }
+}
+
+#[test]
+fn a_file_in_another_encoding_is_told_so() {
+    let temporary = tempfile::tempdir().unwrap();
+    let here = temporary.path();
+    let text = format!("specimen = \"Gold, geprüft\"{JOB}");
+    let utf16: Vec<u8> = text.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    let latin1: Vec<u8> = text.chars().map(|c| c as u8).collect();
+    fs::write(here.join("job.toml"), JOB).unwrap();
+    for (encoding, bytes) in [("UTF-16", utf16), ("Latin-1", latin1)] {
+        fs::write(here.join("other.toml"), bytes).unwrap();
+        for arguments in [
+            &["plan", "other.toml"][..],
+            &["plan", "job.toml", "--rig", "other.toml"],
+            &["calibrate", "white", "--standard", "other.toml"],
+            &["study", "other.toml"],
+            &["campaign", "--replay", "other.toml"],
+        ] {
+            let finished = run(GONIOCTL, here, arguments).expect(2);
+            let said = finished.stderr;
+            assert!(
+                said.contains(encoding) && said.contains("UTF-8"),
+                "{arguments:?}: {said}"
+            );
+            assert!(said.contains("other.toml"), "{arguments:?}: {said}");
+        }
+    }
+}
+
+#[test]
+fn every_unknown_key_is_told_at_once() {
+    let temporary = tempfile::tempdir().unwrap();
+    let here = temporary.path();
+    fs::write(
+        here.join("job.toml"),
+        format!("speciment = \"x\"\nonstage = true\n{JOB}"),
+    )
+    .unwrap();
+    fs::write(here.join("good.toml"), JOB).unwrap();
+    fs::write(
+        here.join("rig.toml"),
+        "[bus]\nbuad = 57600\n[motion]\nsettle = 20\n[sim]\nspeciment = \"x\"\nsede = 3\n",
+    )
+    .unwrap();
+    let said = run(GONIOCTL, here, &["plan", "job.toml"]).expect(2).stderr;
+    for key in [
+        "line 1: speciment",
+        "did you mean `specimen`?",
+        "line 2: onstage",
+        "did you mean `on_stage`?",
+    ] {
+        assert!(said.contains(key), "\"{key}\" is missing in: {said}");
+    }
+    let said = run(GONIOCTL, here, &["plan", "good.toml", "--rig", "rig.toml"])
+        .expect(2)
+        .stderr;
+    for key in [
+        "line 2: bus.buad",
+        "did you mean `baud`?",
+        "line 4: motion.settle",
+        "did you mean `settle_ms`?",
+    ] {
+        assert!(said.contains(key), "\"{key}\" is missing in: {said}");
+    }
+    fs::write(
+        here.join("rig.toml"),
+        "[sim]\nspeciment = \"x\"\nsede = 3\nwire.noyse = 0.1\n",
+    )
+    .unwrap();
+    let said = run(GONIOCTL, here, &["run", "good.toml", "--rig", "rig.toml"])
+        .expect(2)
+        .stderr;
+    for key in ["did you mean `specimen`?", "did you mean `seed`?"] {
+        assert!(said.contains(key), "\"{key}\" is missing in: {said}");
+    }
+}
+
+#[test]
+fn a_campaign_says_nothing_of_what_it_breaks_on_purpose() {
+    let temporary = tempfile::tempdir().unwrap();
+    let arguments = ["campaign", "--captures", "60", "--seed", "1"];
+    let finished = run(GONIOCTL, temporary.path(), &arguments).expect(0);
+    let lines = finished.stderr.lines().count();
+    // Its beginning, a line each tenth, its end.
+    assert!(lines <= 12, "{lines} lines: {}", finished.stderr);
+    assert!(!finished.stderr.contains("WARN"), "{}", finished.stderr);
 }
 
 #[test]

@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What each crate stands on; it may also name what those stand on.
-const EDGES: [(&str, &[&str]); 15] = [
+const EDGES: [(&str, &[&str]); 16] = [
     ("arms", &[]),
     ("brdf", &[]),
     ("terminal", &[]),
+    ("config", &[]),
     ("pdv", &["brdf"]),
-    ("sweep", &["pdv", "arms"]),
-    ("rig", &["arms"]),
+    ("sweep", &["pdv", "arms", "config"]),
+    ("rig", &["arms", "config"]),
     ("capture", &["sweep", "rig", "pdv"]),
     ("report", &["capture", "pdv", "brdf"]),
     ("firmware-sim", &["brdf", "arms", "rig", "terminal"]),
@@ -41,7 +42,7 @@ const NOT_IN_THE_COMMAND_LINE: [&str; 10] = [
 ];
 
 /// No I/O but files behind explicit functions: nothing of these may appear in their manifests or sources.
-const PURE: [&str; 4] = ["arms", "brdf", "pdv", "sweep"];
+const PURE: [&str; 5] = ["arms", "brdf", "config", "pdv", "sweep"];
 const NOT_IN_A_PURE_MANIFEST: [&str; 4] = ["tokio", "rustix", "serialport", "tracing-subscriber"];
 const NOT_IN_A_PURE_SOURCE: [&str; 5] = [
     "std::env",

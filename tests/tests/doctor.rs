@@ -65,6 +65,7 @@ fn a_sound_rig_passes_every_check() {
     assert_eq!(
         names,
         [
+            "clock",
             "disk",
             "port",
             "permission",
@@ -80,13 +81,14 @@ fn a_sound_rig_passes_every_check() {
             "lamp"
         ]
     );
-    for finding in checks {
+    for finding in &checks {
         // How much disk there is and how fast this machine answers is not the rig's doing.
         if !["disk", "round trip"].contains(&finding["check"].as_str().unwrap()) {
             assert_eq!(finding["verdict"], "ok", "{finding:#}");
         }
     }
-    let bins = &told["findings"][9]["histogram"];
+    let round_trip = checks.iter().find(|finding| finding["check"] == "round trip");
+    let bins = &round_trip.unwrap()["histogram"];
     let asked: u64 = bins
         .as_array()
         .unwrap()
@@ -204,4 +206,66 @@ fn a_bad_rig_file_is_refused_before_anything_is_looked_at() {
         "{}",
         finished.stderr
     );
+}
+
+#[test]
+fn a_device_that_answers_pings_alone_is_told_with_the_register_to_write_and_a_run_says_the_same() {
+    const STATUS_RETURN_LEVEL: u16 = 68;
+    for device in [Device::Light, Device::Sensor, Device::Photometer] {
+        let simulator = Simulator::new("");
+        simulator
+            .server
+            .bench(|bench| bench.device(device).write(STATUS_RETURN_LEVEL, &[0]).unwrap());
+        let finished = examined(&simulator, "").expect(3);
+        assert_eq!(finding(&finished, "devices").0, "ok", "it answers a ping");
+        let (verdict, text, _) = finding(&finished, &device.to_string());
+        assert_eq!(verdict, "fail");
+        assert!(text.contains("write 2 to address 68"), "{text}");
+        let told: Value = serde_json::from_str(&finished.stdout).unwrap();
+        let pointing_elsewhere = told["findings"].as_array().unwrap().iter().find(|finding| {
+            let remedy = finding["remedy"].as_str().unwrap_or_default();
+            finding["verdict"] == "fail" && ["cable", "power"].iter().any(|word| remedy.contains(word))
+        });
+        assert_eq!(pointing_elsewhere, None);
+
+        let temporary = tempfile::tempdir().unwrap();
+        simulator.rig_file(temporary.path());
+        fs::write(
+            temporary.path().join("job.toml"),
+            "[[plane]]\ntheta_r_deg = 60\nreadings = 6\n",
+        )
+        .unwrap();
+        let run = run(
+            GONIOCTL,
+            temporary.path(),
+            &["run", "job.toml", "--rig", "rig.toml"],
+        )
+        .expect(3);
+        assert!(run.stderr.contains("write 2 to address 68"), "{}", run.stderr);
+        assert_eq!(simulator.server.counters().goals, 0);
+    }
+}
+
+#[test]
+fn a_supply_at_which_every_run_would_be_held_fails() {
+    let simulator = Simulator::new("[sim]\nfault = [{ device = \"sensor\", what = { sag_s = 36000.0 } }]\n");
+    let finished = examined(&simulator, "").expect(3);
+    let (verdict, text, remedy) = finding(&finished, "suspend");
+    assert_eq!(verdict, "fail");
+    assert!(text.contains("sensor servo is 10.0 V"), "{text}");
+    assert!(
+        remedy.contains("to 11 V") && remedy.contains("suspend.supply_v"),
+        "{remedy}"
+    );
+    // Where nobody watches it, no run is held.
+    let _ = examined(&simulator, "[suspend]\nsupply_v = [0.0, 0.0]\n").expect(0);
+}
+
+#[test]
+fn two_devices_with_one_id_are_told_as_that() {
+    let simulator = Simulator::new("[sim]\nfault = [{ device = \"sensor\", what = { id = 1 } }]\n");
+    let finished = examined(&simulator, "").expect(3);
+    let (verdict, text, remedy) = finding(&finished, "devices");
+    assert_eq!(verdict, "fail", "{text}");
+    assert!(remedy.contains("two devices with one id"), "{text}: {remedy}");
 }

@@ -48,7 +48,7 @@ fn a_merl_file_is_measured_and_the_model_is_written_as_it_is() {
     specimen(&directory.join("specimen.binary"));
     fs::write(
         directory.join("job.toml"),
-        "[[plane]]\ntheta_r_deg = 60.0\nreadings = 40\n[arc]\nreadings = 40\n",
+        "[reconstruction]\nmodel = \"separable\"\n[[plane]]\ntheta_r_deg = 60.0\nreadings = 40\n[arc]\nreadings = 40\n",
     )
     .unwrap();
     fs::write(

@@ -15,7 +15,8 @@ const CODES: [(&str, &str); 4] = [
 ];
 
 /// Files whose error texts a technician may meet.
-const MESSAGES: [&str; 7] = [
+const MESSAGES: [&str; 8] = [
+    "crates/rig/src/calibration/dark_set.rs",
     "crates/rig/src/error.rs",
     "crates/rig/src/drive/error.rs",
     "crates/arms/src/envelope.rs",
@@ -56,10 +57,20 @@ fn variants(source: &str, name: &str) -> Vec<String> {
         .collect()
 }
 
+/// A string literal without the breaks of its lines.
+fn unbroken(literal: &str) -> String {
+    let mut lines = literal.split("\\\n");
+    let first = lines.next().unwrap_or_default().to_owned();
+    lines.fold(first, |text, line| text + line.trim_start())
+}
+
 /// The longest fixed piece of each error text in a source file.
 fn messages(source: &str) -> Vec<String> {
     let attributes = source.split("#[error(").skip(1);
-    let texts = attributes.filter_map(|rest| rest.trim_start().strip_prefix('"')?.split('"').next());
+    let texts: Vec<String> = attributes
+        .filter_map(|rest| rest.trim_start().strip_prefix('"')?.split('"').next())
+        .map(unbroken)
+        .collect();
     let fixed = |text: &str| {
         let pieces = text
             .split('{')
@@ -72,7 +83,7 @@ fn messages(source: &str) -> Vec<String> {
             .to_owned()
     };
     let telling = |text: &String| text.chars().filter(|letter| letter.is_alphabetic()).count() >= LETTERS;
-    texts.map(fixed).filter(telling).collect()
+    texts.iter().map(|text| fixed(text)).filter(telling).collect()
 }
 
 #[test]
@@ -110,6 +121,7 @@ fn every_message_is_explained() {
 fn every_check_of_doctor_is_explained() {
     let page = read("docs/operating.md");
     let checks = [
+        "clock",
         "disk",
         "port",
         "permission",

@@ -10,9 +10,10 @@ use std::process::{Child, Command, Stdio};
 
 use capture::{Outcome, Record};
 use rustix::process::{Pid, Signal, kill_process};
-use tests::{Captured, Finished, on_a_full_disk, run, run_by};
+use tests::{Captured, Finished, Simulator, on_a_full_disk, run, run_by};
 
 const GONIOCTL: &str = env!("CARGO_BIN_EXE_e2e-gonioctl");
+const GONIOD: &str = env!("CARGO_BIN_EXE_e2e-goniod");
 
 /// Long enough not to be over before it is stopped.
 const JOB: &str = "[[plane]]\ntheta_r_deg = 70.0\nreadings = 400\n[arc]\nreadings = 400\n";
@@ -171,4 +172,104 @@ fn a_full_disk_loses_nothing() {
     let readings = full.readings().count();
     assert!((1..800).contains(&readings), "{readings} readings");
     resume(temporary.path(), &full);
+}
+
+/// A pipe by name: who reads it waits until somebody writes, and until that one ends.
+fn pipe(path: &Path) {
+    let mode = rustix::fs::Mode::from_raw_mode(0o600);
+    rustix::fs::mknodat(rustix::fs::CWD, path, rustix::fs::FileType::Fifo, mode, 0).unwrap();
+}
+
+/// Whether this process, and whatever it starts, ignores SIGINT (proc(5), "SigIgn").
+fn ignores_interrupts() -> bool {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    mask.unwrap_or_default() & (1 << (Signal::INT.as_raw() - 1)) != 0
+}
+
+#[test]
+fn a_signal_ends_a_program_that_waits_for_its_input() {
+    let temporary = tempfile::tempdir().unwrap();
+    let here = temporary.path();
+    prepare(here);
+    pipe(&here.join("pipe.toml"));
+    for (program, arguments) in [
+        (GONIOCTL, &["run", "pipe.toml"][..]),
+        (GONIOCTL, &["run", "job.toml", "--rig", "pipe.toml"]),
+        (GONIOCTL, &["calibrate", "white", "--standard", "pipe.toml"]),
+        (GONIOCTL, &["plan", "pipe.toml"]),
+        (GONIOD, &["--config", "pipe.toml", "--listen", "127.0.0.1:0"]),
+    ] {
+        for number in [Signal::INT, Signal::TERM] {
+            // Whoever starts the tests in the background of a shell has them ignore Ctrl-C, and so all that they start.
+            if number == Signal::INT && ignores_interrupts() {
+                println!("left out: SIGINT is ignored here");
+                continue;
+            }
+            let child = Command::new(program)
+                .args(arguments)
+                .current_dir(here)
+                .env_remove("GONIOD_URL")
+                .stdout(Stdio::null())
+                .stderr(Stdio::null())
+                .spawn()
+                .unwrap();
+            // Returns once the program has opened its end, and so waits for what we say.
+            let writer = fs::File::options()
+                .write(true)
+                .open(here.join("pipe.toml"))
+                .unwrap();
+            signal(&child, number);
+            // Where signals do nothing it reads an empty file now, and ends by itself.
+            drop(writer);
+            let status = child.wait_with_output().unwrap().status;
+            assert_eq!(
+                std::os::unix::process::ExitStatusExt::signal(&status),
+                Some(number.as_raw()),
+                "{arguments:?}: {status}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_run_goes_on_where_its_adapter_came_back_and_on_no_other_rig() {
+    let temporary = tempfile::tempdir().unwrap();
+    let here = temporary.path();
+    prepare(here);
+    let before = Simulator::new("");
+    let _ = before.rig_file(here);
+    let (child, stderr) = started(here, "Reading {", 40);
+    signal(&child, Signal::INT);
+    let _ = ended(child, stderr).expect(4);
+    let stopped = Captured::read(&only_run(here));
+    let path = stopped.directory.to_str().unwrap();
+    drop(before);
+
+    let again = Simulator::new("");
+    let port = again.server.path().display().to_string();
+    fs::write(
+        here.join("other.toml"),
+        format!("bus.port = \"{port}\"\nmotion.settle_ms = 77\n"),
+    )
+    .unwrap();
+    let other = run(GONIOCTL, here, &["run", "--resume", path, "--rig", "other.toml"]).expect(2);
+    assert!(
+        other.stderr.contains("only [bus] and [sim] may differ"),
+        "{}",
+        other.stderr
+    );
+    assert_eq!(
+        again.server.counters().packets,
+        0,
+        "nothing was sent to another rig"
+    );
+
+    let moved = again.rig_file(here);
+    let resume = ["run", "--resume", path, "--rig", moved.to_str().unwrap()];
+    let _ = run(GONIOCTL, here, &resume).expect(0);
+    let whole = Captured::read(&stopped.directory);
+    assert_eq!(&whole.records[..stopped.records.len()], &stopped.records[..]);
+    assert!(stopped.directory.join("brdf.binary").exists());
 }

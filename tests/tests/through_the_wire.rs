@@ -12,7 +12,10 @@ use tests::{Captured, difference, run};
 
 const GONIOCTL: &str = env!("CARGO_BIN_EXE_e2e-gonioctl");
 
+/// The model that [`Captured::direct`] makes of the material itself.
 const JOB: &str = "
+[reconstruction]
+model = \"separable\"
 [[plane]]
 theta_r_deg = 70.0
 readings = 90

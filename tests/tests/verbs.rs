@@ -440,3 +440,89 @@ fn until(said: &mut BufReader<ChildStderr>, what: &str) {
         assert!(said.read_line(&mut line).unwrap() > 0, "it ended before: {what}");
     }
 }
+
+#[test]
+fn a_store_is_backed_up_while_the_daemon_runs_and_brought_back() {
+    let mut service = Service::start(&["--listen", "127.0.0.1:0"]);
+    let here = service.directory.path().to_owned();
+    let first = service.submit("short.toml");
+    let _ = service.gonioctl(&["ready", &first]).expect(0);
+    let _ = service.gonioctl(&["watch", &first]).expect(0);
+    let made = run(GONIOD, &here, &["backup", "copy.db", "--data", "data"]).expect(0);
+    assert_eq!(made.stdout.trim(), "copy.db");
+    let second = service.submit("short.toml");
+    let _ = service.gonioctl(&["ready", &second]).expect(0);
+    let _ = service.gonioctl(&["watch", &second]).expect(0);
+    let busy = run(GONIOD, &here, &["restore", "copy.db", "--data", "data"]).expect(2);
+    assert!(
+        busy.stderr.contains("in use by another goniod"),
+        "{}",
+        busy.stderr
+    );
+    service.child.kill().unwrap();
+    service.child.wait().unwrap();
+
+    // Nothing is taken for a new store where runs lie.
+    let data = here.join("data");
+    for name in ["goniod.db", "goniod.db-wal", "goniod.db-shm"] {
+        let _ = fs::remove_file(data.join(name));
+    }
+    let serve = [
+        "--config",
+        "rig.toml",
+        "--data",
+        "data",
+        "--listen",
+        "127.0.0.1:0",
+    ];
+    let refused = run(GONIOD, &here, &serve).expect(2);
+    assert!(refused.stderr.contains("goniod restore"), "{}", refused.stderr);
+    assert!(!data.join("goniod.db").exists(), "no new one was made");
+
+    let restored = run(GONIOD, &here, &["restore", "copy.db", "--data", "data"]).expect(0);
+    assert!(
+        restored.stderr.contains("1 runs are newer than the backup"),
+        "{}",
+        restored.stderr
+    );
+    (service.child, service.address) = launch(&here, &["--listen", "127.0.0.1:0"]);
+    let told = service.gonioctl(&["jobs", "--all", "--json"]).expect(0).stdout;
+    let jobs: Value = serde_json::from_str(&told).unwrap();
+    assert_eq!(jobs.as_array().unwrap().len(), 1, "{jobs}");
+    assert_eq!(
+        (&jobs[0]["id"], &jobs[0]["state"]),
+        (&first.into(), &"done".into())
+    );
+}
+
+#[test]
+fn runs_that_belong_to_no_store_are_accepted_once() {
+    let temporary = tempfile::tempdir().unwrap();
+    let here = temporary.path();
+    fs::write(here.join("rig.toml"), "").unwrap();
+    fs::write(here.join("short.toml"), SHORT).unwrap();
+    let _ = run(
+        GONIOCTL,
+        here,
+        &["run", "short.toml", "--rig", "rig.toml", "--out", "data/runs"],
+    )
+    .expect(0);
+    let serve = [
+        "--config",
+        "rig.toml",
+        "--data",
+        "data",
+        "--listen",
+        "127.0.0.1:0",
+    ];
+    let refused = run(GONIOD, here, &serve).expect(2);
+    assert!(refused.stderr.contains("--accept-runs"), "{}", refused.stderr);
+    for arguments in [
+        &["--listen", "127.0.0.1:0", "--accept-runs"][..],
+        &["--listen", "127.0.0.1:0"],
+    ] {
+        let (mut child, _) = launch(here, arguments);
+        child.kill().unwrap();
+        child.wait().unwrap();
+    }
+}

@@ -60,12 +60,16 @@ pub enum FaultCode {
     Hardware,
     /// An arm did not do what it was told.
     Motion,
+    /// Light gets in from outside.
+    Light,
     /// The port is gone.
     Disconnected,
     /// A device is not what the rig file, or the run, says.
     Mismatch,
     /// The rig file, or its port, cannot be used.
     Setup,
+    /// This computer slept, or the daemon was stopped, for longer than the watchdogs wait.
+    StoodStill,
     /// The disk is full.
     DiskFull,
     /// Another program keeps the store locked.
@@ -88,9 +92,11 @@ impl std::fmt::Display for FaultCode {
             Self::Refused => "refused",
             Self::Hardware => "hardware",
             Self::Motion => "motion",
+            Self::Light => "light",
             Self::Disconnected => "disconnected",
             Self::Mismatch => "mismatch",
             Self::Setup => "setup",
+            Self::StoodStill => "stood_still",
             Self::DiskFull => "disk_full",
             Self::StoreLocked => "store_locked",
             Self::ReadOnly => "read_only",

@@ -55,7 +55,7 @@ pub(crate) struct Execution<'a, R: Rig> {
     touched: bool,
     /// Where the plan left the arms, so that a step's own path leads on.
     standing: Option<Pose>,
-    /// Readings of a flight that has not landed.
+    /// Readings of a flight that has not landed, or of a set of dark readings that was not judged.
     aloft: Vec<Reading>,
     /// Whether the run was held since its last dark and reference readings, so that they say nothing of what follows.
     stale: bool,
@@ -114,6 +114,7 @@ impl<'a, R: Rig> Execution<'a, R> {
     /// Everything up to the last reading.
     pub(crate) async fn all(&mut self) -> Result<(), Interrupt<R::Error>> {
         self.state(State::Identifying);
+        self.drive.begin_anew();
         self.begin().await?;
         self.drive.rest().await?;
         self.suspend().await?;
@@ -145,6 +146,15 @@ impl<'a, R: Rig> Execution<'a, R> {
                     }
                     continue;
                 }
+                if step.sweep == sweep::Sweep::Dark {
+                    let (set, after) = self.dark_set_from(step.index);
+                    next = after;
+                    match set.is_empty() {
+                        true => self.standing = None,
+                        false => self.dark_set(&set).await?,
+                    }
+                    continue;
+                }
                 if self.done[step.index] {
                     self.standing = None;
                     continue;
@@ -154,18 +164,27 @@ impl<'a, R: Rig> Execution<'a, R> {
             }
             self.make_up(first..next).await?;
             if !self.extend().await? {
-                return Ok(());
+                return self.closing_dark().await;
             }
         }
     }
 
     /// Takes at rest what flights left undone.
     async fn make_up(&mut self, steps: std::ops::Range<usize>) -> Result<(), Interrupt<R::Error>> {
-        for index in steps {
+        let mut next = steps.start;
+        while next < steps.end {
+            let index = next;
+            next += 1;
             if self.done[index] {
                 continue;
             }
             let step = self.plan.steps[index].clone();
+            if step.sweep == sweep::Sweep::Dark {
+                let (set, after) = self.dark_set_from(index);
+                next = after;
+                self.dark_set(&set).await?;
+                continue;
+            }
             self.make_ready(step.pose()).await?;
             // Its own path leads from its neighbour in the pass.
             self.standing = self.standing.filter(|&pose| pose == step.pose());

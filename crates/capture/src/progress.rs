@@ -10,6 +10,8 @@ const PRIOR_S: f64 = 5.0;
 pub(crate) struct Progress {
     /// Warm-up still to come, s.
     warm_up_s: f64,
+    /// The last look at the dark, s.
+    closing_s: f64,
     sweeps: Vec<(Sweep, Pace)>,
 }
 
@@ -33,6 +35,7 @@ impl Progress {
         };
         let mut progress = Self {
             warm_up_s,
+            closing_s: plan.closing_s,
             sweeps: Vec::new(),
         };
         left().for_each(|step| progress.pace(step.sweep).left_s += step.seconds);
@@ -51,6 +54,11 @@ impl Progress {
         self.warm_up_s = 0.0;
     }
 
+    /// The dark was looked at for the last time.
+    pub(crate) fn closed(&mut self) {
+        self.closing_s = 0.0;
+    }
+
     /// A step is done that was planned to take `planned_s` and took `measured_s`.
     pub(crate) fn step(&mut self, sweep: Sweep, planned_s: f64, measured_s: f64) {
         let pace = self.pace(sweep);
@@ -64,7 +72,7 @@ impl Progress {
         let left = |(_, pace): &(Sweep, Pace)| {
             pace.left_s.max(0.0) * (pace.measured_s + PRIOR_S) / (pace.planned_s + PRIOR_S)
         };
-        self.warm_up_s + self.sweeps.iter().map(left).sum::<f64>()
+        self.warm_up_s + self.closing_s + self.sweeps.iter().map(left).sum::<f64>()
     }
 
     fn pace(&mut self, sweep: Sweep) -> &mut Pace {

@@ -1,4 +1,6 @@
 use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::Context;
 use capture::{Command, Event, Outcome};
@@ -31,9 +33,13 @@ pub(crate) fn calibrate(arguments: &CalibrateArguments) -> anyhow::Result<ExitCo
         let (sender, control) = watch::channel(Command::Run);
         // Before anything can move.
         let signals = Signals::listen()?;
-        tokio::spawn(obey(signals, sender));
+        let begun = Arc::new(AtomicBool::new(false));
+        tokio::spawn(obey(signals, sender, begun.clone()));
         let mut progress = Progress::new();
-        let mut show = |event: Event| progress.show(&event);
+        let mut show = |event: Event| {
+            begun.store(true, Ordering::Release);
+            progress.show(&event);
+        };
         let calibrated = calibration.carry_out(control, &mut show).await;
         progress.finish();
         anyhow::Ok(calibrated?)
@@ -58,7 +64,7 @@ fn standard(stage: &OnStage) -> anyhow::Result<Standard> {
         OnStage::White { standard: None } => Standard::White(WhiteReference::default()),
         OnStage::White { standard: Some(path) } => {
             let name = path.display().to_string();
-            let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {name}"))?;
+            let text = config::read_text(path).with_context(|| format!("cannot read {name}"))?;
             Standard::White(WhiteReference::parse(&text, &name)?)
         }
         OnStage::Trap => Standard::Trap,

@@ -41,12 +41,13 @@ pub(crate) fn campaign(
         }
     });
     terminal::say(format_args!(
-        "{} captures with {} faults in {:.1} s: {} executions, {} readings true within their uncertainty",
+        "{} captures with {} faults in {:.1} s: {} executions, {} readings true within their uncertainty, {} captures told to be bad",
         campaigned.captures,
         campaigned.faults,
         begun.elapsed().as_secs_f64(),
         campaigned.executions,
-        campaigned.readings
+        campaigned.readings,
+        campaigned.bad
     ));
     if as_json {
         terminal::json(&campaigned)?;
@@ -69,6 +70,10 @@ pub(crate) fn replay(script: &Path, as_json: bool) -> anyhow::Result<ExitCode> {
     let carried = Script::read(script)?.carry();
     match &carried {
         Ok(carried) if as_json => terminal::json(carried)?,
+        Ok(carried) if carried.bad => terminal::line(format_args!(
+            "{} executions, and its report says that it is not to be believed",
+            carried.executions
+        ))?,
         Ok(carried) => terminal::line(format_args!(
             "{} executions, {} readings true within their uncertainty",
             carried.executions, carried.readings

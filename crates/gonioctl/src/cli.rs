@@ -66,7 +66,8 @@ pub(crate) enum Command {
         /// Where run directories are made [default: runs]. No daemon is asked where it is given.
         #[arg(long, value_name = "DIR", conflicts_with = "resume")]
         out: Option<PathBuf>,
-        /// Go on with a run that was stopped or failed, from its directory.
+        /// Go on with a run that was interrupted, from its directory; --rig may name a rig file with another port,
+        /// where the rig is connected elsewhere now.
         #[arg(long, value_name = "RUN_DIR")]
         resume: Option<PathBuf>,
         #[command(flatten)]
@@ -379,6 +380,7 @@ mod tests {
         let parse = |arguments: &[&str]| Cli::try_parse_from([&["gonioctl", "run"], arguments].concat());
         assert!(parse(&["job.toml"]).is_ok());
         assert!(parse(&["--resume", "runs/1"]).is_ok());
+        assert!(parse(&["--resume", "runs/1", "--rig", "rig.toml"]).is_ok());
         assert!(parse(&[]).is_err());
         assert!(parse(&["job.toml", "--resume", "runs/1"]).is_err());
         assert!(parse(&["--resume", "runs/1", "--out", "elsewhere"]).is_err());

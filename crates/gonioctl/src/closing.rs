@@ -78,9 +78,9 @@ impl Closing {
         match self.status {
             Status::Done => terminal::say("done"),
             Status::Unusable => terminal::say("every step was measured"),
-            Status::Stopped => terminal::say("stopped; the readings so far are safe"),
+            Status::Stopped => terminal::say("interrupted: stopped; the readings so far are safe"),
             _ => terminal::say(format_args!(
-                "failed: {}",
+                "interrupted: {}",
                 run["fault"].as_str().unwrap_or("see above")
             )),
         }

@@ -8,6 +8,9 @@ use session::RigPort;
 use crate::findings::Findings;
 use crate::signals::Signals;
 
+/// Devices of a rig: two servos and the photometer.
+const ALL: usize = 3;
+
 /// Checks a rig without moving it, and says what to do about what is wrong.
 ///
 /// # Errors
@@ -22,9 +25,12 @@ pub(crate) fn doctor(rig: Option<&Path>, out: &Path, as_json: bool) -> anyhow::R
 
 /// All checks, from the machine to the light; those that build on one that failed are left out.
 fn examine(port: &Path, file: &RigFile, out: &Path, tell: &mut dyn FnMut(Finding)) -> anyhow::Result<()> {
-    tell(doctor::disk(out));
+    tell(doctor::clock());
+    tell(doctor::disk(out, file.suspend.disk_bytes));
     let seen = Host::default().port(port, file.bus.latency.as_secs_f64() * 1e3);
     let usable = seen.iter().all(|finding| finding.verdict != Verdict::Fail);
+    let timer = seen.iter().find(|finding| finding.check == "latency timer");
+    let timer = timer.map(|finding| finding.verdict);
     seen.into_iter().for_each(&mut *tell);
     if !usable {
         return Ok(());
@@ -40,7 +46,7 @@ fn examine(port: &Path, file: &RigFile, out: &Path, tell: &mut dyn FnMut(Finding
     runtime.block_on(async {
         let mut signals = Signals::listen()?;
         tokio::select! {
-            () = ask(&mut drive, &present, tell) => {}
+            () = ask(&mut drive, &present, timer, tell) => {}
             () = signals.next() => {
                 terminal::say("interrupted; the lamp goes off");
                 drive.lamp(false).await?;
@@ -50,20 +56,32 @@ fn examine(port: &Path, file: &RigFile, out: &Path, tell: &mut dyn FnMut(Finding
     })
 }
 
-/// What the devices say.
-async fn ask(drive: &mut Drive<Dynamixel>, present: &[Device], tell: &mut dyn FnMut(Finding)) {
+/// What the devices say. One that does not answer is asked nothing more: whatever was said of it then would point
+/// elsewhere than what is known already.
+async fn ask(
+    drive: &mut Drive<Dynamixel>,
+    present: &[Device],
+    timer: Option<Verdict>,
+    tell: &mut dyn FnMut(Finding),
+) {
+    let mut answering = Vec::new();
     for &device in present {
-        tell(doctor::device(drive, device).await);
+        let finding = doctor::device(drive, device).await;
+        if finding.verdict != Verdict::Fail || doctor::answers(drive, device).await {
+            answering.push(device);
+        }
+        tell(finding);
     }
-    let here = |device| present.contains(&device);
-    if here(Device::Photometer) {
-        tell(doctor::round_trip(drive).await);
+    let photometer = answering.contains(&Device::Photometer);
+    if photometer {
+        tell(doctor::round_trip(drive, timer).await);
     }
-    if [Device::Light, Device::Sensor, Device::Photometer]
-        .into_iter()
-        .all(here)
-    {
+    if answering.len() == ALL {
+        doctor::together(drive).await.into_iter().for_each(&mut *tell);
         tell(doctor::pose(drive).await);
+        doctor::suspend(drive).await.into_iter().for_each(&mut *tell);
+    }
+    if photometer {
         doctor::light(drive).await.into_iter().for_each(tell);
     }
 }

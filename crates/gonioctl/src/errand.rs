@@ -40,19 +40,17 @@ impl Errand {
             }
             text => text?,
         };
-        if arguments.daemon.is_none() || rig.is_some() {
-            let (here, name) = session::rig_file(rig)?;
-            if RigFile::parse(&text, "the daemon's rig file".as_ref()).ok() != Some(here) {
-                let name = name.display();
-                anyhow::ensure!(
-                    arguments.daemon.is_none(),
-                    "--rig: the daemon drives another rig than {name}"
-                );
-                terminal::say(format_args!(
-                    "the daemon drives another rig than {name}; it is not asked"
-                ));
-                return Ok(None);
-            }
+        if (arguments.daemon.is_none() || rig.is_some())
+            && let Some(name) = other_rig(&text, rig)?
+        {
+            anyhow::ensure!(
+                arguments.daemon.is_none(),
+                "--rig: the daemon drives another rig than {name}"
+            );
+            terminal::say(format_args!(
+                "the daemon drives another rig than {name}; it is not asked"
+            ));
+            return Ok(None);
         }
         free(&daemon)?;
         let job = queue::hand_in(&daemon, job)?.id;
@@ -66,8 +64,12 @@ impl Errand {
     /// Has the daemon go on with a run that it began. `None`: it did not begin it, or the run is over.
     ///
     /// # Errors
-    /// A daemon that is named and not there, or refuses.
-    pub(crate) fn resume(directory: &Path, arguments: &DaemonArguments) -> anyhow::Result<Option<Self>> {
+    /// A daemon that is named and not there, has another rig than `rig` says, or refuses.
+    pub(crate) fn resume(
+        directory: &Path,
+        rig: Option<&Path>,
+        arguments: &DaemonArguments,
+    ) -> anyhow::Result<Option<Self>> {
         // What is wrong with a directory is told by who goes on without a daemon.
         let records = FileJournal::read(directory.join("journal")).unwrap_or_default();
         let Some(Record::Header(header)) = records.first() else {
@@ -82,6 +84,15 @@ impl Errand {
         let job = daemon.job(run.job)?;
         if job.state.over() {
             return Ok(None);
+        }
+        // Its readings go on in the daemon's store, so nobody else may go on with it.
+        if rig.is_some()
+            && let Some(name) = other_rig(&daemon.read_text("/rig/file")?, rig)?
+        {
+            anyhow::bail!(
+                "--rig: the daemon that began this run drives another rig than {name}: correct its rig file and start \
+                 it again"
+            );
         }
         daemon.act_on_job(job.id, Action::Resume)?;
         Ok(Some(Self {
@@ -124,6 +135,16 @@ impl Errand {
             again: format!("gonioctl resume {}", job.id),
         })
     }
+}
+
+/// Name of the rig file here, the one named or the one that is found, where a daemon's rig file says something else.
+///
+/// # Errors
+/// The rig file here cannot be read, or is wrong.
+fn other_rig(daemons: &str, rig: Option<&Path>) -> anyhow::Result<Option<String>> {
+    let (here, name) = session::rig_file(rig)?;
+    let same = RigFile::parse(daemons, "the daemon's rig file".as_ref()).ok() == Some(here);
+    Ok((!same).then(|| name.display().to_string()))
 }
 
 /// Whether a daemon could begin a job now: `run` waits for nobody.

@@ -5,6 +5,11 @@ use brdf::{Brdf, MerlTable};
 use pdv::{Draw, compare};
 use serde_json::Value;
 
+/// Width of a column of the table of metrics, characters: that of 0.000000 and a digit more.
+const LEAST_WIDTH: usize = 9;
+/// Blanks between two columns, characters.
+const GAP: usize = 2;
+
 /// Compares two BRDFs by every metric.
 ///
 /// # Errors
@@ -45,16 +50,22 @@ pub(crate) fn lines(comparison: &Value) -> Vec<String> {
     ];
     let channels = &comparison["channels"];
     let columns = [comparison, &channels["r"], &channels["g"], &channels["b"]];
-    let mut lines = vec![format!(
-        "{:<13}{:>11}{:>11}{:>11}{:>11}",
-        "", "all", "red", "green", "blue"
-    )];
-    for name in ROWS {
-        let cell = |value: f64| format!("{value:.6}");
-        let cells = columns.map(|column| column[name].as_f64().map_or_else(|| "-".to_owned(), cell));
-        let [all, red, green, blue] = cells;
-        lines.push(format!("{name:<13}{all:>11}{red:>11}{green:>11}{blue:>11}"));
-    }
+    let heads = ["all", "red", "green", "blue"].map(str::to_owned);
+    let cell = |value: f64| format!("{value:.6}");
+    let cells = |name| columns.map(|column| column[name].as_f64().map_or_else(|| "-".to_owned(), cell));
+    let rows: Vec<_> = ROWS.into_iter().map(|name| (name, cells(name))).collect();
+    // A gap before each column, however many digits its numbers have.
+    let widths: [usize; 4] = std::array::from_fn(|column| {
+        let longest = rows.iter().map(|(_, cells)| cells[column].len()).max();
+        longest.unwrap_or_default().max(LEAST_WIDTH) + GAP
+    });
+    let line = |name: &str, cells: &[String; 4]| {
+        let cells = cells.iter().zip(widths);
+        let cells: String = cells.map(|(cell, width)| format!("{cell:>width$}")).collect();
+        format!("{name:<12}{cells}")
+    };
+    let mut lines = vec![line("", &heads)];
+    lines.extend(rows.iter().map(|(name, cells)| line(name, cells)));
     let number = |value: &Value| value.as_f64().unwrap_or(f64::NAN);
     lines.push(format!(
         "over {} pairs below {:.0}°, {:.1} % of those drawn left out",
@@ -63,4 +74,41 @@ pub(crate) fn lines(comparison: &Value) -> Vec<String> {
         100.0 * number(&comparison["left_out"])
     ));
     lines
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+    use serde_json::json;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn prop_numbers_of_any_size_stand_apart(all in -1e12..1e12f64, red in 0.0..1e300f64, green in 0.0..1.0f64) {
+            let metrics = |value: f64| json!({
+                "male": value, "median_rel": value, "p95_rel": value, "rel_rms": value,
+                "log_rel_rmse": value, "eq4": value, "eq4_black": value
+            });
+            let mut comparison = metrics(all);
+            comparison["channels"] = json!({ "r": metrics(red), "g": metrics(green), "b": null });
+            let lines = lines(&comparison);
+            let lengths: Vec<_> = lines[..8].iter().map(|line| line.chars().count()).collect();
+            prop_assert!(lengths.iter().all(|&length| length == lengths[0]), "{lines:?}");
+            for line in &lines[1..8] {
+                let cells: Vec<_> = line.split_whitespace().collect();
+                let expected = [format!("{all:.6}"), format!("{red:.6}"), format!("{green:.6}"), "-".to_owned()];
+                prop_assert_eq!(&cells[1..], &expected[..]);
+            }
+        }
+    }
+
+    #[test]
+    fn an_error_of_1000_percent_does_not_run_into_its_neighbour() {
+        let row = json!({ "p95_rel": 1234.5678 });
+        let mut comparison = row.clone();
+        comparison["channels"] = json!({ "r": row, "g": row, "b": row });
+        let line = &lines(&comparison)[3];
+        assert_eq!(line.split_whitespace().count(), 5, "{line}");
+    }
 }

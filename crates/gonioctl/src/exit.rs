@@ -12,10 +12,10 @@ pub(crate) fn code(status: Status) -> ExitCode {
     ExitCode::from(status.code())
 }
 
-/// Exit code of an error, and the error in one line with all its causes.
-pub(crate) fn failure(error: &anyhow::Error) -> (ExitCode, String) {
+/// Exit status of an error, and the error in one line with all its causes.
+pub(crate) fn failure(error: &anyhow::Error) -> (Status, String) {
     let status = error.chain().find_map(status).unwrap_or(Status::Invalid);
-    (code(status), format!("{error:#}"))
+    (status, format!("{error:#}"))
 }
 
 /// What one error of a chain says about the exit code.

@@ -34,22 +34,39 @@ use arms::{Arm, ArmAngle};
 use cli::{ArmName, Cli, Command, DaemonArguments, Output};
 use operator::OperatorCommand;
 use run::Task;
+use session::Status;
 use terminal::{LevelFilter, LogFormat};
 
 /// Runs the command line of this process and returns its exit code.
 pub fn main() -> ExitCode {
-    let cli: Cli = match terminal::arguments() {
+    let cli: Cli = match terminal::arguments(|error| tell_machines(Status::Invalid, error)) {
         Ok(cli) => cli,
         Err(code) => return code,
     };
-    terminal::log(LogFormat::Human, LevelFilter::WARN);
+    // A campaign has things go wrong on purpose; what it finds is printed at its end.
+    let least = match cli.command {
+        Command::Campaign { .. } => LevelFilter::OFF,
+        _ => LevelFilter::WARN,
+    };
+    terminal::log(LogFormat::Human, least);
     match command(cli.command) {
         Ok(code) => code,
         Err(error) => {
-            let (code, text) = exit::failure(&error);
+            let (status, text) = exit::failure(&error);
+            tell_machines(status, &text);
             terminal::say(format_args!("gonioctl: {text}"));
-            code
+            exit::code(status)
         }
+    }
+}
+
+/// With `--json`, an error is an object on stdout too, on a line of its own, so that no reader of JSON gets nothing.
+fn tell_machines(status: Status, text: &str) {
+    let given = std::env::args_os().take_while(|argument| argument != "--");
+    if given.into_iter().any(|argument| argument == "--json") {
+        let object = serde_json::json!({ "error": text, "exit_status": status.code() });
+        // Nobody is left to tell where stdout is gone.
+        let _ = terminal::json_line(&object);
     }
 }
 
@@ -69,17 +86,12 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             daemon,
             output,
         } => {
+            let rig = rig.rig.as_deref();
             let task = match (&job, &resume) {
-                (_, Some(directory)) => {
-                    anyhow::ensure!(
-                        rig.rig.is_none(),
-                        "--rig: a run goes on with the rig file that it began with"
-                    );
-                    Task::Resume(directory)
-                }
+                (_, Some(directory)) => Task::Resume { directory, rig },
                 (Some(job), None) => Task::New {
                     job,
-                    rig: rig.rig.as_deref(),
+                    rig,
                     out: out.as_deref(),
                 },
                 (None, None) => unreachable!("clap requires one of them"),

@@ -17,6 +17,7 @@ pub(crate) fn plan(job: &Path, rig: Option<&Path>, as_json: bool) -> anyhow::Res
         terminal::json(&json!({
             "seconds": plan.seconds(),
             "overhead_s": plan.overhead_s,
+            "closing_s": plan.closing_s,
             "readings": plan.steps.len(),
             "light": order.light(&plan),
             "left_out": plan.left_out,
@@ -102,6 +103,12 @@ fn list(plan: &Plan, light: Light) -> std::io::Result<()> {
         "warm-up",
         "",
         clock(plan.overhead_s)
+    ))?;
+    terminal::line(format_args!(
+        "{:<10} {:>14} {:>12}",
+        "last dark",
+        "",
+        clock(plan.closing_s)
     ))?;
     terminal::line(format_args!(
         "{:<10} {:>5} readings {:>12}",

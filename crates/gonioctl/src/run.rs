@@ -1,9 +1,11 @@
 use std::path::Path;
-use std::process::ExitCode;
+use std::process::{self, ExitCode};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use capture::{Command, Event};
-use session::{Ended, RunRequest, SessionError};
+use session::{Ended, RunRequest, SessionError, Status};
 use tokio::sync::watch;
 
 use crate::cli::DaemonArguments;
@@ -25,8 +27,13 @@ pub(crate) enum Task<'a> {
         /// Where its directory is made; `None`: nobody said.
         out: Option<&'a Path>,
     },
-    /// Go on with a run directory.
-    Resume(&'a Path),
+    /// Go on with a run.
+    Resume {
+        /// Its directory.
+        directory: &'a Path,
+        /// Rig file that says where the rig is now; `None`: where the run began.
+        rig: Option<&'a Path>,
+    },
 }
 
 /// Captures, reconstructs and says where everything is; or has a daemon do that, where one has the rig.
@@ -38,7 +45,7 @@ pub(crate) fn run(task: &Task<'_>, daemon: &DaemonArguments, json: bool) -> anyh
     let errand = match *task {
         Task::New { job, rig, out: None } => Errand::begin(job, rig, daemon)?,
         Task::New { .. } => None,
-        Task::Resume(directory) => Errand::resume(directory, daemon)?,
+        Task::Resume { directory, rig } => Errand::resume(directory, rig, daemon)?,
     };
     let closing = match errand {
         Some(errand) => errand.wait()?,
@@ -57,6 +64,11 @@ pub(crate) fn run(task: &Task<'_>, daemon: &DaemonArguments, json: bool) -> anyh
 
 /// Does it in this process.
 fn alone(task: &Task<'_>) -> anyhow::Result<Closing> {
+    // Before signals are listened for: reading may block, and until then a signal ends the program by itself.
+    let order = match task {
+        Task::New { job, rig, .. } => Some(RunRequest::read(job, *rig)?),
+        Task::Resume { .. } => None,
+    };
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(1)
         .enable_all()
@@ -65,36 +77,62 @@ fn alone(task: &Task<'_>) -> anyhow::Result<Closing> {
         let (sender, control) = watch::channel(Command::Run);
         // Before anything can move.
         let signals = Signals::listen()?;
-        tokio::spawn(obey(signals, sender));
-        capture(task, control).await
+        let begun = Arc::new(AtomicBool::new(false));
+        tokio::spawn(obey(signals, sender, begun.clone()));
+        capture(task, order.as_ref(), control, &begun).await
     })?;
     Ok(Closing::of(&ended)?)
 }
 
-/// Hands what signals ask for to the capture.
-pub(crate) async fn obey(mut signals: Signals, sender: watch::Sender<Command>) {
-    for (command, word) in STEPS {
+/// Hands what signals ask for to the capture. Before `begun` is set nothing has moved or is lit, and after the capture
+/// has ended nothing moves any more: then a signal, and a second one, ends the program at once, whatever it waits for.
+pub(crate) async fn obey(mut signals: Signals, sender: watch::Sender<Command>, begun: Arc<AtomicBool>) {
+    let mut steps = STEPS.into_iter();
+    let mut warned = false;
+    loop {
         signals.next().await;
+        if !begun.load(Ordering::Acquire) {
+            terminal::say("interrupted before the capture began; nothing has moved");
+            process::exit(Status::Stopped.code().into());
+        }
         // Nobody listens any more once the capture has ended.
-        match sender.send(command) {
-            Ok(()) => terminal::say(word),
-            Err(_) => terminal::say("the capture has already ended; its results are being written"),
+        if sender.is_closed() {
+            if warned {
+                terminal::say("ended while the results were being written; the readings are safe");
+                process::exit(Status::Stopped.code().into());
+            }
+            warned = true;
+            terminal::say(
+                "the capture has already ended; its results are being written; again to end without them",
+            );
+            continue;
+        }
+        // A third one changes nothing: the arms are already being stopped as fast as they can be.
+        if let Some((command, word)) = steps.next() {
+            sender.send_replace(command);
+            terminal::say(word);
         }
     }
 }
 
-async fn capture(task: &Task<'_>, control: watch::Receiver<Command>) -> anyhow::Result<Ended> {
+async fn capture(
+    task: &Task<'_>,
+    order: Option<&RunRequest>,
+    control: watch::Receiver<Command>,
+    begun: &AtomicBool,
+) -> anyhow::Result<Ended> {
     let mut progress = Progress::new();
     let mut show = |event: Event| {
+        begun.store(true, Ordering::Release);
         tracing::debug!(?event);
         progress.show(&event);
     };
-    let ended: Result<Ended, SessionError> = match task {
-        Task::New { job, rig, out } => {
-            let order = RunRequest::read(job, *rig)?;
-            session::run(&order, out.unwrap_or(Path::new(RUNS)), control, &mut show).await
+    let ended: Result<Ended, SessionError> = match (task, order) {
+        (Task::New { out, .. }, Some(order)) => {
+            session::run(order, out.unwrap_or(Path::new(RUNS)), control, &mut show).await
         }
-        Task::Resume(directory) => session::resume(directory, control, &mut show).await,
+        (Task::Resume { directory, rig }, _) => session::resume(directory, *rig, control, &mut show).await,
+        (Task::New { .. }, None) => unreachable!("a new run has its order"),
     };
     progress.finish();
     Ok(ended?)

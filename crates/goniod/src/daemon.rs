@@ -15,6 +15,7 @@ use crate::operator::{NotKept, OperatorControl};
 use crate::queue::{Queue, Request};
 use crate::refusal::chain;
 use crate::shared::Shared;
+use crate::strays::RunDirectories;
 use crate::worker::{RigWorker, WorkerPlace};
 use crate::{
     Action, Caller, DaemonError, Events, FaultId, Job, JobId, PlanView, PortOfFile, ReadingView, Refusal,
@@ -22,6 +23,8 @@ use crate::{
 };
 use session::RunRequest;
 
+/// Name of the store in the data folder.
+pub(crate) const STORE: &str = "goniod.db";
 /// Requests that may wait for the queue; a further one is refused.
 const REQUESTS: usize = 64;
 /// Events of the worker that may wait for the queue.
@@ -64,12 +67,19 @@ impl Daemon {
     /// A rig that does not answer is no error: it is looked for again and again.
     ///
     /// # Errors
-    /// A rig file that is wrong; a data folder that cannot be written, or is in use; a store that cannot be opened; a
-    /// port that another program has.
+    /// A rig file that is wrong; a data folder that cannot be written, or is in use; a store that cannot be opened, is
+    /// damaged, or does not know run directories that lie beside it; a port that another program has.
     pub async fn open(settings: Settings) -> Result<Self, DaemonError> {
         session::prepare_output(&settings.data)?;
         let lock = Lock::take(&settings.data)?;
-        let store = Sqlite::open(&settings.data.join("goniod.db")).await?;
+        let path = settings.data.join(STORE);
+        let runs = RunDirectories::of(&settings.data)?;
+        runs.check_file(&path)?;
+        let store = Sqlite::open(&path).await?;
+        if let Err(error) = runs.check_store(&path, &store).await {
+            store.close().await;
+            return Err(error);
+        }
         Self::start(settings, Arc::new(store), lock, PortOfFile, WorkerPlace::Thread).await
     }
 

@@ -14,17 +14,30 @@ pub enum DaemonError {
     /// The store cannot be opened, read or written.
     #[error(transparent)]
     Store(#[from] crate::StoreError),
+    /// Run directories lie beside a store that does not know them.
+    #[error(
+        "the store {} {how} {count} of the runs in {}, such as {such_as}: it was emptied, deleted or replaced. Bring it \
+         back with `goniod restore BACKUP --data DIR`; or, where these runs belong to no store, start once with \
+         --accept-runs",
+        .store.display(), .runs.display()
+    )]
+    StrangeRuns {
+        /// The store.
+        store: PathBuf,
+        /// What of the store shows that.
+        how: &'static str,
+        /// Where the run directories are.
+        runs: PathBuf,
+        /// How many it does not know.
+        count: usize,
+        /// One of them.
+        such_as: String,
+    },
     /// Another daemon uses the data folder.
     #[error("the data folder {} is in use by another goniod", .path.display())]
     InUse {
         /// Which.
         path: PathBuf,
-    },
-    /// The rig file has changed since the run began in more than its port.
-    #[error("the rig file is not the one with which run {run} began: only [bus] and [sim] may differ")]
-    OtherRig {
-        /// Which run.
-        run: String,
     },
     /// A thread cannot be started.
     #[error("cannot start a thread for the rig")]

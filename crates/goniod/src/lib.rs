@@ -18,6 +18,7 @@ mod refusal;
 mod service;
 mod shared;
 mod store;
+mod strays;
 mod view;
 mod worker;
 
@@ -33,5 +34,5 @@ pub use rebuild::rebuild;
 pub use refusal::{Refusal, RefusalKind};
 pub use service::{command, main};
 pub use session::{OpenRig, PortOfFile, RigSource};
-pub use store::{Behaviour, Memory, Sqlite, Store, StoreError};
+pub use store::{Behaviour, Memory, Sqlite, Store, StoreError, backup, restore};
 pub use worker::WorkerPlace;

@@ -14,7 +14,7 @@ pub async fn rebuild(directory: &Path) -> Result<Option<Report>, DaemonError> {
         .parent()
         .and_then(Path::parent)
         .unwrap_or(Path::new("."));
-    let store = store.join("goniod.db");
+    let store = store.join(crate::daemon::STORE);
     if !store.exists() {
         return Ok(None);
     }

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::time::SystemTime;
 
 use anyhow::Context;
-use clap::{CommandFactory, Parser};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 use sd_notify::NotifyState;
 use session::{SessionError, Status};
@@ -15,8 +15,11 @@ use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
 use tokio::task::JoinSet;
 
+use crate::daemon::STORE;
 use crate::http::{self, Access, Address, Limits, Listener, Tokens};
-use crate::{Daemon, DaemonError, Settings};
+use crate::lock::Lock;
+use crate::strays::RunDirectories;
+use crate::{Daemon, DaemonError, Settings, Sqlite, Store as _};
 
 /// Where TCP is listened on when nothing else is said.
 const LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 4664);
@@ -25,8 +28,10 @@ const THREADS: usize = 2;
 
 /// The daemon of a gonio-reflectometer: a queue of jobs, a page to watch them, hands that stop the rig.
 #[derive(Parser)]
-#[command(name = "goniod", version)]
+#[command(name = "goniod", version, args_conflicts_with_subcommands = true)]
 struct Arguments {
+    #[command(subcommand)]
+    store_command: Option<StoreCommand>,
     /// Rig file [default: config/rig.toml where there is one, else the built-in simulator]
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -38,6 +43,10 @@ struct Arguments {
     /// Folder of the store and of the run directories
     #[arg(long, value_name = "DIR", default_value = "runs")]
     data: PathBuf,
+    /// Start although the store does not know run directories that lie in the data folder, and remember that they belong
+    /// to no store
+    #[arg(long)]
+    accept_runs: bool,
     /// File with the tokens that everybody needs who comes over TCP, made where there is none [default: tokens.toml in
     /// the data folder]
     #[arg(long, value_name = "FILE")]
@@ -55,6 +64,33 @@ struct Arguments {
     log: LogFormat,
 }
 
+/// What is done instead of serving.
+#[derive(Subcommand)]
+enum StoreCommand {
+    /// Copy the store into a new file, complete and checked, also while a daemon uses it; prints the file
+    Backup {
+        /// The new file
+        file: PathBuf,
+        #[command(flatten)]
+        data: Data,
+    },
+    /// Put a backup in the place of the store, which is kept under another name; no daemon may run
+    Restore {
+        /// The backup
+        file: PathBuf,
+        #[command(flatten)]
+        data: Data,
+    },
+}
+
+/// Which data folder.
+#[derive(Args)]
+struct Data {
+    /// Folder of the store and of the run directories
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    data: PathBuf,
+}
+
 /// The daemon's command line, of which its manual page is made.
 pub fn command() -> clap::Command {
     Arguments::command()
@@ -64,7 +100,7 @@ pub fn command() -> clap::Command {
 ///
 /// The addresses that it listens on are printed to stdout, one a line, once it answers.
 pub fn main() -> ExitCode {
-    let arguments: Arguments = match terminal::arguments() {
+    let arguments: Arguments = match terminal::arguments(|_| {}) {
         Ok(arguments) => arguments,
         Err(code) => return code,
     };
@@ -73,14 +109,9 @@ pub fn main() -> ExitCode {
         .worker_threads(THREADS)
         .enable_all()
         .build();
-    let ended = runtime.context("cannot start").and_then(|runtime| {
-        runtime.block_on(async {
-            match &arguments.reconstruct {
-                Some(directory) => reconstruct(directory).await,
-                None => run(arguments).await,
-            }
-        })
-    });
+    let ended = runtime
+        .context("cannot start")
+        .and_then(|runtime| runtime.block_on(carry_out(arguments)));
     match ended {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -103,11 +134,65 @@ async fn reconstruct(directory: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
+async fn carry_out(mut arguments: Arguments) -> anyhow::Result<()> {
+    match arguments.store_command.take() {
+        Some(StoreCommand::Backup { file, data }) => {
+            crate::backup(&data.data.join(STORE), &file)
+                .await
+                .map_err(DaemonError::from)?;
+            terminal::line(file.display())?;
+            Ok(())
+        }
+        Some(StoreCommand::Restore { file, data }) => restore(&file, &data.data).await,
+        None => match &arguments.reconstruct {
+            Some(directory) => reconstruct(directory).await,
+            None => run(arguments).await,
+        },
+    }
+}
+
+/// Puts a backup in the place of the store of a data folder, and says what became of what was there.
+async fn restore(backup: &Path, data: &Path) -> anyhow::Result<()> {
+    session::prepare_output(data)?;
+    let _lock = Lock::take(data)?;
+    let now = humantime::format_rfc3339_seconds(SystemTime::now()).to_string();
+    let store = data.join(STORE);
+    let aside = crate::restore(backup, &store, &now.replace(':', ""))
+        .await
+        .map_err(DaemonError::from)?;
+    if let Some(aside) = aside {
+        tracing::info!("what was there is kept as {}", aside.display());
+    }
+    let runs = RunDirectories::of(data)?;
+    let restored = Sqlite::open(&store).await.map_err(DaemonError::from)?;
+    let known = runs.check_store(&store, &restored).await;
+    restored.close().await;
+    if let Err(DaemonError::StrangeRuns { count, such_as, .. }) = &known {
+        // Whoever brings back an older store knows that it lacks what came after.
+        runs.accept()?;
+        tracing::warn!(
+            "{count} runs are newer than the backup, such as {such_as}: their directories are whole by themselves, and \
+             the daemon will not list them"
+        );
+    } else {
+        known?;
+    }
+    terminal::line(store.display())?;
+    Ok(())
+}
+
 async fn run(arguments: Arguments) -> anyhow::Result<()> {
     open_files();
-    // Asked for first: a signal during start-up ends it just as well.
-    let ended = terminated()?;
+    // Before signals are listened for: reading may block, and until then a signal ends the program by itself.
     let (rig, rig_name) = session::rig_text(arguments.config.as_deref())?;
+    let ended = terminated()?;
+    if arguments.accept_runs {
+        session::prepare_output(&arguments.data)?;
+        let accepted = RunDirectories::of(&arguments.data)?.accept()?;
+        tracing::info!(
+            "{accepted} runs in the data folder are accepted, whether the store knows them or not"
+        );
+    }
     let daemon = Daemon::open(Settings {
         rig,
         rig_name: rig_name.display().to_string(),

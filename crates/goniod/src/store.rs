@@ -11,7 +11,8 @@ mod sqlite;
 
 pub(crate) use journal::StoreJournal;
 pub use memory::{Behaviour, Memory};
-pub use sqlite::Sqlite;
+pub(crate) use sqlite::has_log;
+pub use sqlite::{Sqlite, backup, restore};
 
 /// Where everything is kept that must outlive the program: jobs, runs, their journals, and who asked what.
 ///
@@ -126,6 +127,28 @@ pub enum StoreError {
         /// Why.
         source: sqlx::migrate::MigrateError,
     },
+    /// It is damaged.
+    #[error("the store {} is damaged: {why}; bring a backup back with `goniod restore`", .path.display())]
+    Corrupt {
+        /// Where.
+        path: PathBuf,
+        /// What is wrong with it.
+        why: String,
+    },
+    /// A copy of it would replace something.
+    #[error("{} exists already: name a new file for the backup", .path.display())]
+    Exists {
+        /// Where.
+        path: PathBuf,
+    },
+    /// A copy of it cannot be written.
+    #[error("cannot write the copy of the store {}", .path.display())]
+    Copy {
+        /// Where.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
     /// A query failed.
     #[error("cannot {what} in the store")]
     Query {
@@ -151,6 +174,14 @@ pub enum StoreError {
 }
 
 impl StoreError {
+    /// SQLite's primary result code of an error, where it has one: an extended code has it in its low byte.
+    pub(crate) fn primary_code(error: &sqlx::Error) -> Option<u32> {
+        let code = error
+            .as_database_error()
+            .and_then(sqlx::error::DatabaseError::code)?;
+        code.parse::<u32>().ok().map(|code| code & 0xFF)
+    }
+
     /// The fault that it is (SQLite, "Result and Error Codes"; an extended code has its primary one in the low byte).
     pub(crate) fn code(&self) -> FaultCode {
         const BUSY: u32 = 5;
@@ -161,11 +192,7 @@ impl StoreError {
         let (Self::Open { source, .. } | Self::Query { source, .. }) = self else {
             return FaultCode::Store;
         };
-        let code = source
-            .as_database_error()
-            .and_then(sqlx::error::DatabaseError::code);
-        let code = code.and_then(|code| code.parse::<u32>().ok());
-        match code.map(|code| code & 0xFF) {
+        match Self::primary_code(source) {
             Some(FULL) => FaultCode::DiskFull,
             Some(BUSY | LOCKED) => FaultCode::StoreLocked,
             Some(READONLY) => FaultCode::ReadOnly,

@@ -16,8 +16,10 @@ pub(crate) fn fault_code(kind: FaultKind) -> FaultCode {
         FaultKind::Refused => FaultCode::Refused,
         FaultKind::Hardware => FaultCode::Hardware,
         FaultKind::Motion => FaultCode::Motion,
+        FaultKind::Light => FaultCode::Light,
         FaultKind::Disconnected => FaultCode::Disconnected,
         FaultKind::Mismatch => FaultCode::Mismatch,
+        FaultKind::StoodStill => FaultCode::StoodStill,
         _ => FaultCode::Setup,
     }
 }

@@ -1,21 +1,93 @@
+use capture::Record;
 use glam::DVec3;
 use pdv::{Model, Observation};
+use rig::Certificate;
 use serde_json::json;
 
-use crate::{Check, Readings, Run, Verdict};
+use crate::{Check, Measurement, Readings, Run, Verdict};
 
 mod coverage;
+mod darkness;
 mod energy;
 mod reflectance;
+mod visits;
 
 pub(crate) use coverage::coverage;
+pub(crate) use darkness::darkness;
 pub(crate) use energy::energy;
 pub(crate) use reflectance::reflectance;
+pub(crate) use visits::visits;
 
 /// Two readings of one pose may differ by so much before somebody should look: the repeatability of a good rig.
 const REPEAT_LIMIT: f64 = 0.03;
+/// A pose that is measured again when a run goes on may differ by so many of its expanded uncertainties, and at least by so
+/// much, before what was measured until then cannot be believed: 6 standard deviations.
+const RESUMED_SIGMAS: f64 = 3.0;
+const RESUMED_LEAST: f64 = 0.01;
 /// The two sides of a lobe may differ by so much: beyond it the assumption of the model costs more than the rig does.
 const SIDES_LIMIT: f64 = 0.10;
+
+/// Whether what a run measured before it was interrupted still holds: one of its poses is measured again when it goes on. `None`
+/// where it never was interrupted. What changed meanwhile, or was wrong just before, shows in nothing else.
+pub(crate) fn resumed(measurements: &[Measurement], records: &[Record]) -> Option<Check> {
+    let u_of = |step: usize| {
+        let of_step = measurements
+            .iter()
+            .filter(|m| m.reading.step == step && m.reading.accepted);
+        let relative = of_step.filter_map(|m| Some((m.u? / m.rgb()?.abs()).max_element()));
+        relative.fold(0.0, f64::max)
+    };
+    let repeats: Vec<(f64, f64)> = records
+        .iter()
+        .filter_map(|record| match record {
+            Record::Repeat {
+                reading,
+                difference_rel,
+            } if reading.lamp => Some((*difference_rel, u_of(reading.step))),
+            _ => None,
+        })
+        .collect();
+    let worst = repeats
+        .iter()
+        .map(|(difference, _)| difference.abs())
+        .reduce(f64::max)?;
+    let bad = repeats
+        .iter()
+        .filter(|(difference, u)| difference.abs() > (RESUMED_SIGMAS * u).max(RESUMED_LEAST))
+        .count();
+    let (verdict, text) = match (bad, limit(worst, REPEAT_LIMIT)) {
+        (0, Verdict::Good) => (
+            Verdict::Good,
+            format!(
+                "A pose that was measured again when the run went on differs by at most {:.2} %.",
+                100.0 * worst
+            ),
+        ),
+        (0, verdict) => (
+            verdict,
+            format!(
+                "A pose that was measured again when the run went on differs by up to {:.1} %, within its uncertainty.",
+                100.0 * worst
+            ),
+        ),
+        (bad, _) => (
+            Verdict::Bad,
+            format!(
+                "A pose that was measured again when the run went on differs by up to {:.1} %, more than its uncertainty, \
+                 {bad} of {} times: specimen, lamp or room are not what they were, or something was wrong before the \
+                 interruption. Measure anew.",
+                100.0 * worst,
+                repeats.len()
+            ),
+        ),
+    };
+    Some(Check {
+        name: "resumed",
+        verdict,
+        text,
+        values: json!({ "differences": repeats.iter().map(|(difference, _)| difference).collect::<Vec<_>>() }),
+    })
+}
 
 /// Whether there is a reconstruction: without one a complete run has no result.
 pub(crate) fn reconstruction(model: Option<&dyn Model>, no_model: Option<&str>, complete: bool) -> Check {
@@ -33,7 +105,7 @@ pub(crate) fn reconstruction(model: Option<&dyn Model>, no_model: Option<&str>, 
         name: "reconstruction",
         verdict,
         text,
-        values: json!({ "model": model.map(|model| model.about()), "no_model": no_model }),
+        values: json!({ "model": model.map(Model::about), "no_model": no_model }),
     }
 }
 
@@ -188,6 +260,27 @@ pub(crate) fn bus(run: &Run) -> Check {
         ),
         values: json!({ "readings": run.readings, "retries": run.retries, "flags": run.flags }),
     }
+}
+
+/// What is to be said of the certificate with which the run was calibrated.
+pub(crate) fn calibration(certificate: Option<&Certificate>) -> Option<Check> {
+    let certificate = certificate?;
+    let good = format!(
+        "The calibration {} agrees with what was known before it.",
+        certificate.id
+    );
+    Some(Check {
+        name: "calibration",
+        verdict: match certificate.remarks.is_empty() {
+            true => Verdict::Good,
+            false => Verdict::Look,
+        },
+        text: match certificate.remarks.as_slice() {
+            [] => good,
+            remarks => remarks.join(" "),
+        },
+        values: json!({ "id": certificate.id, "number": certificate.number, "remarks": certificate.remarks }),
+    })
 }
 
 fn limit(value: f64, limit: f64) -> Verdict {

@@ -30,6 +30,9 @@ pub enum ReportError {
         /// What was found and what is allowed.
         why: String,
     },
+    /// The journal's calibration holds a value that no rig of its rig file can have.
+    #[error("the calibration in the journal, which was damaged or edited: restore the journal from a copy")]
+    Certificate(#[source] rig::RigError),
     /// The readings of a standard do not make a calibration.
     #[error("no calibration")]
     Calibration(#[source] rig::RigError),

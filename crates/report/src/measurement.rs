@@ -61,11 +61,12 @@ impl Measurement {
 pub fn measurements(records: &[Record], rig: &RigFile) -> Vec<Measurement> {
     let readings = all_taken(records);
     let all: Vec<Taken> = readings.iter().map(|(_, taken)| *taken).collect();
+    let believed = believed(&readings);
     let visits = readings
         .iter()
         .filter(|(reading, _)| reading.sweep == Sweep::Reference && reading.accepted);
     let visits: Vec<Taken> = visits.map(|(_, taken)| *taken).collect();
-    let reduction = Reduction::new(rig, certificate(records), &all, &visits);
+    let reduction = Reduction::new(rig, certificate(records), &believed, &visits);
     let stays = stays(records);
     let measure = |(i, (reading, taken)): (usize, &(&Reading, Taken))| {
         let exposures = match reading.accepted {
@@ -150,6 +151,14 @@ pub(crate) fn all_taken(records: &[Record]) -> Vec<(&Reading, Taken)> {
             (reading, taken)
         })
         .collect()
+}
+
+/// What a reduction is made of: dark readings of a set that was not believed are left out.
+pub(crate) fn believed(readings: &[(&Reading, Taken)]) -> Vec<Taken> {
+    let believed = readings
+        .iter()
+        .filter(|(reading, _)| reading.lamp || reading.accepted);
+    believed.map(|(_, taken)| *taken).collect()
 }
 
 /// The stored calibration that holds for a run, from its journal.

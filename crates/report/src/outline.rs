@@ -72,12 +72,11 @@ fn title(report: &Report) -> &str {
 
 fn facts(report: &Report) -> Vec<(&'static str, String)> {
     let run = &report.run;
-    let state = match (run.state, &run.fault) {
-        (State::Done, _) => "done".to_owned(),
-        (State::Failed, Some(fault)) => format!("failed: {fault}"),
-        (State::Failed, None) => "failed".to_owned(),
-        (State::Stopped, _) => "stopped before the end".to_owned(),
-        (State::Interrupted, _) => "interrupted".to_owned(),
+    let state = match (run.state, &run.fault, run.exit_status) {
+        (State::Done, _, _) => "done".to_owned(),
+        (State::Interrupted, Some(fault), _) => format!("interrupted: {fault}"),
+        (State::Interrupted, None, Some(_)) => "interrupted: stopped by the operator".to_owned(),
+        (State::Interrupted, None, None) => "interrupted".to_owned(),
     };
     let devices: Vec<String> = run
         .identities

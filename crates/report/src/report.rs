@@ -9,6 +9,7 @@ use serde::Serialize;
 use sweep::{Job, LeftOut};
 
 use crate::derive::{Sweeps, truth};
+use crate::measurement::certificate;
 use crate::{
     Adapted, Check, Measurement, MonteCarlo, Pace, ReportError, Run, RunDirectory, Verdict, checks,
     measurements, outline, preview, slice, write_readings,
@@ -143,6 +144,9 @@ impl Examined {
         let job = Job::parse(&header.job, "job file").map_err(ReportError::Job)?;
         let job = capture::extended_plan(records).map_or(job.clone(), |plan| job.grown(&plan));
         let rig = RigFile::parse(&header.rig, "rig file".as_ref()).map_err(ReportError::Rig)?;
+        if let Some(certificate) = certificate(records) {
+            certificate.check(&rig).map_err(ReportError::Certificate)?;
+        }
         let mut run = Run::new(header, records);
         let measurements = measurements(records, &rig);
         let sweeps = Sweeps::new(&job, &measurements);
@@ -158,6 +162,7 @@ impl Examined {
             checks::reconstruction(model.as_deref(), no_model.as_deref(), run.complete()),
             checks::reflectance(&measurements, &job),
         ];
+        checks.extend(inputs(&measurements, records, &rig));
         checks.extend(check(&run, &job, &sweeps));
         if let Some(model) = &model {
             checks.extend(check_model(model.as_ref(), &job, &sweeps, &rig));
@@ -230,6 +235,18 @@ fn write_factors(model: &dyn Model, draws: &MonteCarlo, out: impl Write) -> io::
         }
     }
     writer.flush()
+}
+
+/// Checks of what the readings are worked out with: the dark level, and the certificate where one was used.
+fn inputs(measurements: &[Measurement], records: &[Record], rig: &RigFile) -> Vec<Check> {
+    let darkness = checks::darkness(measurements, records, rig);
+    let calibration = checks::calibration(certificate(records));
+    let visits = checks::visits(records, rig);
+    std::iter::once(darkness)
+        .chain(calibration)
+        .chain(visits)
+        .chain(checks::resumed(measurements, records))
+        .collect()
 }
 
 /// What the readings say of the measurement, whatever is made of them.

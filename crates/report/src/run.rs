@@ -10,31 +10,15 @@ use crate::Verdict;
 /// Seconds per tick of the photometer's clock.
 pub(crate) const TICK_S: f64 = 1e-5;
 
-/// How a run stands.
+/// How a run stands, in the words in which the daemon says how its job stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum State {
     /// Every step was read.
     Done,
-    /// The operator stopped it; it can be resumed.
-    Stopped,
-    /// A fault ended it; it can be resumed once that is mended.
-    Failed,
-    /// It goes on, or its process ended without a word; it can be resumed.
+    /// It is not complete and can be resumed: the operator stopped it, a fault ended it, its process ended without a
+    /// word, or it still goes on. [`Run::fault`] and [`Run::exit_status`] say which.
     Interrupted,
-}
-
-impl State {
-    /// Exit status of the command that ran it, by what the checks say of its result; `None` while there is none.
-    pub fn exit_status(self, verdict: Verdict) -> Option<u8> {
-        match self {
-            Self::Done if verdict == Verdict::Bad => Some(6),
-            Self::Done => Some(0),
-            Self::Failed => Some(3),
-            Self::Stopped => Some(4),
-            Self::Interrupted => None,
-        }
-    }
 }
 
 /// A text of the journal's header with its SHA-256.
@@ -65,6 +49,10 @@ pub struct Used {
     pub made: String,
     /// How each of its parts was made.
     pub parts: BTreeMap<&'static str, Conditions>,
+    /// Its place in the order of certificates; 0: it was made before they had one.
+    pub number: u64,
+    /// What is worth a look in it.
+    pub remarks: Vec<String>,
 }
 
 impl Used {
@@ -72,6 +60,8 @@ impl Used {
         Self {
             id: certificate.id.clone(),
             made: certificate.made.clone(),
+            number: certificate.number,
+            remarks: certificate.remarks.clone(),
             parts: certificate
                 .parts()
                 .map(|(name, conditions)| (name, conditions.clone()))
@@ -89,7 +79,8 @@ pub struct Run {
     pub state: State,
     /// What the checks say of its result as a whole.
     pub verdict: Verdict,
-    /// Exit status of the command that ran it last.
+    /// Exit status of the command that ran it last: 0 complete, 6 complete and not usable, 3 ended by a fault, 4 stopped by the operator; `None`
+    /// where it goes on, or ended without a word.
     pub exit_status: Option<u8>,
     /// The fault in words, where one ended it.
     pub fault: Option<String>,
@@ -180,6 +171,8 @@ impl Run {
                 } => {
                     run.executions += 1;
                     run.state = State::Interrupted;
+                    run.exit_status = None;
+                    run.fault = None;
                     run.identities.clone_from(identities);
                     clock = *device_ticks;
                 }
@@ -213,14 +206,15 @@ impl Run {
             }
         }
         run.closed = capture::closed(records);
-        run.exit_status = run.state.exit_status(run.verdict);
         run
     }
 
     /// Notes what the checks say of the result as a whole.
     pub(crate) fn judge(&mut self, verdict: Verdict) {
         self.verdict = verdict;
-        self.exit_status = self.state.exit_status(verdict);
+        if self.state == State::Done && verdict == Verdict::Bad {
+            self.exit_status = Some(6);
+        }
     }
 
     /// Whether every step of the plan has an accepted reading, and no more can be added.
@@ -267,11 +261,14 @@ impl Run {
     }
 
     fn end(&mut self, outcome: &Outcome, at: &str) {
-        (self.state, self.fault) = match outcome {
-            Outcome::Done => (State::Done, None),
-            Outcome::Stopped => (State::Stopped, None),
-            Outcome::Failed { fault } => (State::Failed, Some(fault.clone())),
+        let (state, exit_status, fault) = match outcome {
+            Outcome::Done => (State::Done, 0, None),
+            Outcome::Stopped => (State::Interrupted, 4, None),
+            Outcome::Failed { fault } => (State::Interrupted, 3, Some(fault.clone())),
         };
+        self.state = state;
+        self.exit_status = Some(exit_status);
+        self.fault = fault;
         self.ended = Some(at.to_owned());
     }
 }
@@ -305,6 +302,7 @@ mod tests {
                 steps: Vec::new(),
                 left_out: Vec::new(),
                 overhead_s: 0.0,
+                closing_s: 0.0,
                 open: false,
             },
             started: "2026-01-01T00:00:00Z".into(),
@@ -365,7 +363,7 @@ mod tests {
             reading(Sweep::Plane(1), 9_100_000, vec![]),
         ];
         let run = Run::new(&header(), &records[..5]);
-        assert_eq!((run.state, run.exit_status), (State::Stopped, Some(4)));
+        assert_eq!((run.state, run.exit_status), (State::Interrupted, Some(4)));
         let run = Run::new(&header(), &records);
         assert_eq!(
             (run.state, run.exit_status),

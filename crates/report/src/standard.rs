@@ -6,8 +6,8 @@ use rig::{
 use serde::Deserialize;
 use sweep::{Sweep, Visit};
 
-use crate::measurement::all_taken;
-use crate::{ReportError, measurements};
+use crate::measurement::{all_taken, believed};
+use crate::{ReportError, Verdict, checks, measurements};
 
 /// Readings at each certified geometry of a white reference.
 const WHITE_REPEATS: usize = 6;
@@ -96,7 +96,11 @@ impl WhiteReference {
             file: file.to_owned(),
             why,
         };
-        let raw: RawWhite = toml::from_str(text).map_err(|error| refuse(error.to_string()))?;
+        let raw: RawWhite = config::parse(text).map_err(|flaws| {
+            let line = flaws.line(text).map(|line| format!("line {line}: "));
+            let key = flaws.first().key.as_ref().map(|key| format!("{key}: "));
+            refuse([line, key, Some(flaws.why(text))].into_iter().flatten().collect())
+        })?;
         let within =
             |key: &str, value: f64, range: std::ops::RangeInclusive<f64>| match range.contains(&value) {
                 true => Ok(value),
@@ -187,7 +191,7 @@ impl Standard {
     /// The caller gives it its id and time.
     ///
     /// # Errors
-    /// Readings that do not make a calibration.
+    /// Readings that do not make a calibration, or one that no rig of this rig file can have.
     pub fn certify(
         &self,
         file: &RigFile,
@@ -195,7 +199,7 @@ impl Standard {
         before: &Certificate,
     ) -> Result<Certificate, ReportError> {
         let readings = all_taken(records);
-        let taken: Vec<Taken> = readings.iter().map(|(_, taken)| *taken).collect();
+        let taken = believed(&readings);
         let of = |sweep: Sweep, at: &dyn Fn(Pose) -> bool| -> Vec<Taken> {
             let of = readings
                 .iter()
@@ -203,6 +207,13 @@ impl Standard {
             of.map(|(_, taken)| *taken).collect()
         };
         let failed = ReportError::Calibration;
+        let dark = checks::darkness(&measurements(records, file), records, file);
+        if dark.verdict == Verdict::Bad {
+            return Err(failed(rig::RigError::Calibration {
+                what: "dark level",
+                why: dark.text,
+            }));
+        }
         let conditions = |of| self.conditions(records, of);
         let mut certificate = before.clone();
         match self {
@@ -247,6 +258,7 @@ impl Standard {
                 });
             }
         }
+        certificate.check(file).map_err(failed)?;
         Ok(certificate)
     }
 

@@ -4,11 +4,13 @@ use crate::Gain;
 
 mod certificate;
 mod dark;
+mod dark_set;
 mod ladder;
 mod lamp;
 mod line;
 mod linearity;
 mod measure;
+mod plausible;
 mod rate;
 mod reduction;
 mod taken;
@@ -17,6 +19,7 @@ mod tests;
 
 pub use certificate::{Certificate, Colour, Conditions, Patch, Trap, White, Zero, ZeroUncertainty};
 pub use dark::{Dark, DarkCounts, Darks};
+pub use dark_set::{DarkFault, check_dark_set};
 pub use lamp::{Drift, Lamp};
 pub use measure::Certified;
 pub use reduction::{Budget, Reduction, Reflectance};
@@ -65,7 +68,7 @@ pub enum Unusable {
     /// The monitor is at full scale: the lamp's output is only known to be larger.
     #[error("the lamp monitor is at full scale: integration_max_us is too long for it")]
     Monitor,
-    /// No dark reading was taken at this gain.
-    #[error("no dark reading at gain ×{}", u16::from(*.0))]
+    /// No dark reading at this gain says what was there without the lamp: none was taken, or light from outside filled it.
+    #[error("no dark reading at gain ×{} that says anything", u16::from(*.0))]
     Dark(Gain),
 }

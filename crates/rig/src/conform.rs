@@ -33,7 +33,7 @@ pub async fn conform(drive: &mut Drive<Dynamixel>, restart: bool, tell: &mut (dy
         judge(doctor::device(drive, device).await);
     }
     judge(doctor::pose(drive).await);
-    judge(doctor::round_trip(drive).await);
+    judge(doctor::round_trip(drive, None).await);
     if !sound {
         return;
     }

@@ -9,10 +9,12 @@ mod all;
 mod error;
 mod expose;
 mod fly;
+mod pulse;
 mod retry;
 mod travel;
 
 pub use error::DriveError;
+use pulse::Pulse;
 
 /// Longest wait between two looks at a rig that is engaged or lit: soon enough to stop the other arm when one fails.
 const LOOK: Duration = Duration::from_millis(200);
@@ -34,6 +36,7 @@ pub struct Drive<R: Rig> {
     engaged: bool,
     lamp: bool,
     seen: watch::Sender<Option<Snapshot>>,
+    pulse: Pulse,
 }
 
 impl<R: Rig> Drive<R> {
@@ -47,6 +50,7 @@ impl<R: Rig> Drive<R> {
             engaged: false,
             lamp: false,
             seen: watch::Sender::new(None),
+            pulse: Pulse::default(),
         }
     }
 
@@ -63,6 +67,29 @@ impl<R: Rig> Drive<R> {
     /// Requests that were repeated so far; the difference over a reading is that reading's.
     pub fn retries(&self) -> u32 {
         self.retries
+    }
+
+    /// For how long the devices heard nothing, where that was longer than their watchdogs wait: this computer slept, or
+    /// the program was stopped. What goes wrong afterwards is most likely the watchdogs' doing.
+    pub fn stood_still(&self) -> Option<Duration> {
+        self.pulse.gap()
+    }
+
+    /// Says that an execution begins: what [`Drive::stood_still`] tells is over.
+    pub fn begin_anew(&mut self) {
+        self.pulse.forget();
+    }
+
+    /// Says that a lit reading was sound, lamp and pose: after two of them nothing came of [`Drive::stood_still`].
+    pub fn is_sound(&mut self) {
+        self.pulse.sound();
+    }
+
+    /// Notes that the devices have heard from this program.
+    fn beat(&mut self) {
+        let watchdog = self.file.motion.watchdog;
+        let armed = (self.engaged || self.lamp) && !watchdog.is_zero();
+        self.pulse.beat(armed.then_some(watchdog));
     }
 
     /// Where the arms are and what the photometer does.

@@ -55,6 +55,16 @@ pub enum RigError {
         /// What may stand there.
         allowed: String,
     },
+    /// A value of a calibration certificate is one that no rig of this rig file can have.
+    #[error("{key} is {found}, allowed: {allowed}")]
+    Certificate {
+        /// The key, with its table, such as `white.gains[1]`.
+        key: String,
+        /// What was found.
+        found: String,
+        /// What may stand there.
+        allowed: String,
+    },
     /// The readings of a standard do not make a calibration.
     #[error("{what}: {why}")]
     Calibration {
@@ -207,6 +217,7 @@ impl Fault for RigError {
             Self::Read { .. }
             | Self::Form { .. }
             | Self::Value { .. }
+            | Self::Certificate { .. }
             | Self::Calibration { .. }
             | Self::Ports { .. }
             | Self::PortMissing { .. }

@@ -45,12 +45,16 @@ pub enum FaultKind {
     Hardware,
     /// An arm did not do what it was told: stalled, lost its torque, or never settled.
     Motion,
+    /// Light from outside: what the photometer counts is not that of the lamp.
+    Light,
     /// The port is gone.
     Disconnected,
     /// The device is not what the rig file says: wrong model, mode, limits.
     Mismatch,
     /// The rig file, or the port that it names, cannot be used; nothing was sent.
     Setup,
+    /// This computer slept, or the program was stopped, for longer than the watchdogs wait.
+    StoodStill,
 }
 
 /// An error of a rig, with the little that generic code needs of it.

@@ -259,7 +259,7 @@ impl RigFile {
     /// The file cannot be read; else as [`RigFile::parse`].
     pub fn load(path: impl AsRef<Path>) -> Result<Self, RigError> {
         let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|source| RigError::Read {
+        let text = config::read_text(path).map_err(|source| RigError::Read {
             path: path.to_owned(),
             source,
         })?;

@@ -16,12 +16,14 @@ mod fault;
 mod file;
 mod rig;
 mod surroundings;
+mod wall_clock;
 
 pub use actuator::{Actuator, Identity, Location};
 pub use axis::{ACCELERATION_UNIT_RAD_S2, Axis, COUNTS_PER_TURN, VELOCITY_UNIT_RAD_S};
 pub use calibration::{
-    Budget, Calibration, Certificate, Certified, Colour, Conditions, Dark, DarkCounts, Darks, Drift, Filling,
-    Lamp, MIN_COSINE, Patch, Reduction, Reflectance, Taken, Trap, Unusable, White, Zero, ZeroUncertainty,
+    Budget, Calibration, Certificate, Certified, Colour, Conditions, Dark, DarkCounts, DarkFault, Darks,
+    Drift, Filling, Lamp, MIN_COSINE, Patch, Reduction, Reflectance, Taken, Trap, Unusable, White, Zero,
+    ZeroUncertainty, check_dark_set,
 };
 pub use detector::{Counts, Detector, DetectorStatus, Exposure, Gain, Phase};
 pub use drive::{Drive, DriveError};
@@ -34,3 +36,4 @@ pub use file::{
 };
 pub use rig::{Observation, Rig, Snapshot};
 pub use surroundings::Surroundings;
+pub use wall_clock::WallClock;

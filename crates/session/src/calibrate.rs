@@ -4,7 +4,7 @@ use std::time::SystemTime;
 
 use capture::{Command, Event, FileJournal, Header, Journal, Outcome};
 use report::{RunDirectory, Standard};
-use rig::{Certificate, Port, RigFile};
+use rig::{Certificate, Port, RigFile, WallClock};
 use tokio::sync::watch;
 use ulid::Ulid;
 
@@ -18,6 +18,7 @@ pub struct Calibration {
     rig_text: String,
     rig_name: String,
     standard: Standard,
+    clock: fn() -> SystemTime,
 }
 
 /// How a calibration ended.
@@ -57,19 +58,32 @@ impl Calibration {
             rig_text,
             rig_name: name.display().to_string(),
             standard,
+            clock: SystemTime::now,
         })
+    }
+
+    /// The same by another wall clock than that of the system.
+    #[must_use]
+    pub fn with_clock(mut self, clock: fn() -> SystemTime) -> Self {
+        self.clock = clock;
+        self
     }
 
     /// Takes the readings of the standard, into a directory of their own beside the certificates, and makes a new
     /// certificate of them and of the other parts of the newest one for this rig file. The arms move.
     ///
     /// # Errors
-    /// What is wrong with files, port and devices; readings that do not make a calibration; a medium that refuses.
+    /// A clock that cannot be right, since the calibration would be dated wrongly; what is wrong with files, port and
+    /// devices; readings that do not make a calibration; a medium that refuses.
     pub async fn carry_out(
         &self,
         control: watch::Receiver<Command>,
         on_event: &mut (dyn FnMut(Event) + Send),
     ) -> Result<Calibrated, SessionError> {
+        let now = (self.clock)();
+        if let Some(why) = WallClock::at(now).fault() {
+            return Err(SessionError::Clock { why });
+        }
         let certificates = Certificates::at(&self.rig.certificates.directory);
         let visits = self.standard.visits(&self.rig);
         let plan = |start| {
@@ -84,7 +98,6 @@ impl Calibration {
         prepare_output(certificates.path())?;
         let mut station = OpenRig::open(&self.rig, &self.rig_name)?;
         let start = station.start().await?;
-        let now = SystemTime::now();
         let id = Ulid::generate();
         let made = humantime::format_rfc3339_seconds(now).to_string();
         let header = Header {
@@ -103,14 +116,21 @@ impl Calibration {
         let certificate = match outcome {
             Outcome::Done => {
                 let parts = self.standard.certify(&self.rig, journal.records(), &before)?;
-                let certificate = Certificate {
+                let remarks =
+                    parts.differences(Some(&before).filter(|before| before.white.is_some()), &self.rig);
+                let (certificate, path) = certificates.keep(Certificate {
                     id: id.to_string(),
                     made,
                     rig: self.rig.fingerprint.clone(),
                     ..parts
-                };
-                let path = certificates.keep(&certificate)?;
-                Some((certificate, path))
+                })?;
+                Some((
+                    Certificate {
+                        remarks,
+                        ..certificate
+                    },
+                    path,
+                ))
             }
             _ => None,
         };

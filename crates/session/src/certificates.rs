@@ -2,13 +2,40 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
-use rig::{Certificate, RigFile};
+use rig::{Certificate, RigFile, WallClock};
 
 use crate::SessionError;
 
+mod file;
+
 /// The stored calibrations of a directory, one JSON file each, named for its id.
+///
+/// Their order is that of the numbers that they were given as they were stored; those of programs that gave none come
+/// before, in the order of their ids. The wall clock orders nothing.
 #[derive(Clone, Debug)]
 pub struct Certificates(PathBuf);
+
+/// A certificate with its file.
+#[derive(Clone, Debug)]
+struct Stored {
+    path: PathBuf,
+    certificate: Certificate,
+    /// Whether the file has a digest, with which it agrees.
+    sealed: bool,
+}
+
+impl Stored {
+    fn refuse(&self, why: impl Into<String>) -> SessionError {
+        file::refused(&self.path, why)
+    }
+
+    /// Checks that its values can be those of a rig.
+    fn check(&self, rig: &RigFile) -> Result<(), SessionError> {
+        self.certificate
+            .check(rig)
+            .map_err(|error| self.refuse(error.to_string()))
+    }
+}
 
 impl Certificates {
     /// Those in a directory, which need not exist yet.
@@ -21,52 +48,56 @@ impl Certificates {
         &self.0
     }
 
-    /// The newest one for a rig file, however old; `None`: there is none.
+    /// The newest one for a rig file, however old, with what is worth a look in it; `None`: there is none.
     ///
     /// # Errors
-    /// A directory or file that cannot be read, or is no certificate.
+    /// A directory or file that cannot be read, a file that is no certificate or was changed after it was written, two
+    /// with one number, or a value in the newest one that no rig of this rig file can have.
     pub fn newest(&self, rig: &RigFile) -> Result<Option<Certificate>, SessionError> {
-        let failed = |path: &Path| {
-            let path = path.to_owned();
-            move |source| SessionError::Read {
-                what: "calibration",
-                path,
-                source,
-            }
+        let mut stored = self.all()?;
+        stored.retain(|stored| stored.certificate.rig == rig.fingerprint);
+        let Some(newest) = stored.pop() else {
+            return Ok(None);
         };
-        let entries = match fs::read_dir(&self.0) {
-            Ok(entries) => entries,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(failed(&self.0)(error)),
-        };
-        let mut paths: Vec<PathBuf> = entries
-            .map(|entry| entry.map(|entry| entry.path()))
-            .collect::<Result<_, _>>()
-            .map_err(failed(&self.0))?;
-        paths.retain(|path| path.extension().is_some_and(|extension| extension == "json"));
-        // Names begin with ids, and ids with their time.
-        paths.sort();
-        for path in paths.iter().rev() {
-            let text = fs::read_to_string(path).map_err(failed(path))?;
-            let certificate: Certificate =
-                serde_json::from_str(&text).map_err(|error| failed(path)(error.into()))?;
-            if certificate.rig == rig.fingerprint {
-                return Ok(Some(certificate));
-            }
+        newest.check(rig)?;
+        // One that is not believed is nothing to compare with.
+        let before = stored.pop().filter(|before| before.check(rig).is_ok());
+        if let Some(before) = &before
+            && newest.certificate.number != 0
+            && before.certificate.number == newest.certificate.number
+        {
+            return Err(newest.refuse(format!(
+                "its number, {}, is also that of {}: nobody can tell which is newer",
+                newest.certificate.number,
+                before.path.display()
+            )));
         }
-        Ok(None)
+        let mut certificate = newest.certificate;
+        certificate.remarks = certificate.differences(before.as_ref().map(|before| &before.certificate), rig);
+        if !newest.sealed {
+            certificate.remarks.push(format!(
+                "The calibration {} has no digest, since an older version of this program made it: nobody can tell \
+                 whether it was edited or damaged. Calibrate anew.",
+                certificate.id
+            ));
+        }
+        Ok(Some(certificate))
     }
 
     /// The one that holds for a run that begins now: the newest for the rig file, with a white reference, and with no
     /// part older than the rig file allows.
     ///
     /// # Errors
-    /// There is none, or it is too old; as [`Certificates::newest`].
-    pub fn valid(&self, rig: &RigFile, now: SystemTime) -> Result<Certificate, SessionError> {
+    /// There is none, or it is too old; a clock that cannot be right, since no age can be told by it; as
+    /// [`Certificates::newest`].
+    pub fn valid(&self, rig: &RigFile, clock: WallClock) -> Result<Certificate, SessionError> {
         let refuse = |why: String| SessionError::Uncertified {
             directory: self.0.clone(),
             why,
         };
+        if let Some(why) = clock.fault() {
+            return Err(refuse(format!("no age of a calibration can be told: {why}")));
+        }
         let Some(certificate) = self.newest(rig)? else {
             return Err(refuse(
                 "there is none for this rig file; make one with `gonioctl calibrate white`".to_owned(),
@@ -79,9 +110,22 @@ impl Certificates {
             )));
         }
         for (part, conditions) in certificate.parts() {
-            let age = age(&conditions.made, now);
+            let made = humantime::parse_rfc3339(&conditions.made).map_err(|error| {
+                refuse(format!(
+                    "{} has a {part} part of {:?}, which is no time ({error}); make it again with `gonioctl calibrate {part}`",
+                    certificate.id, conditions.made
+                ))
+            })?;
+            if clock.is_before(made) {
+                return Err(refuse(format!(
+                    "its {part} part is of {}, and the clock of this computer says {}: one of them is wrong. Set the \
+                     clock; if it is right, it was wrong when the part was made: make it again with `gonioctl calibrate {part}`",
+                    conditions.made,
+                    humantime::format_rfc3339_seconds(clock.now)
+                )));
+            }
             let max = rig.certificates.max_age;
-            if age.is_none_or(|age| age > max) {
+            if age(made, clock.now) > max {
                 return Err(refuse(format!(
                     "its {part} part is of {}, max_age_h allows {:.1} h; make it again with `gonioctl calibrate {part}`",
                     conditions.made,
@@ -92,83 +136,59 @@ impl Certificates {
         Ok(certificate)
     }
 
-    /// Stores a certificate, complete or not at all.
+    /// Stores a certificate, complete or not at all, as the newest of the directory; returns it with its number, and
+    /// its file.
     ///
     /// # Errors
-    /// The medium refused.
-    pub fn keep(&self, certificate: &Certificate) -> Result<PathBuf, SessionError> {
+    /// The medium refused; a file in the directory that cannot be read, so that nobody knows the numbers.
+    pub fn keep(&self, certificate: Certificate) -> Result<(Certificate, PathBuf), SessionError> {
+        let numbers = self.all()?.into_iter().map(|stored| stored.certificate.number);
+        let certificate = Certificate {
+            number: numbers.max().unwrap_or_default() + 1,
+            remarks: Vec::new(),
+            ..certificate
+        };
         let name = format!("{}.json", certificate.id);
         let directory = report::RunDirectory::at(&self.0);
-        directory.write(&name, |file| {
-            serde_json::to_writer_pretty(file, certificate).map_err(Into::into)
-        })?;
-        Ok(directory.file(&name))
+        directory.write(&name, |out| file::write(&certificate, out))?;
+        Ok((certificate, directory.file(&name)))
+    }
+
+    /// All of them, oldest first.
+    fn all(&self) -> Result<Vec<Stored>, SessionError> {
+        let failed = |source| SessionError::Read {
+            what: "calibrations in",
+            path: self.0.clone(),
+            source,
+        };
+        let entries = match fs::read_dir(&self.0) {
+            Ok(entries) => entries,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
+            Err(error) => return Err(failed(error)),
+        };
+        let mut paths: Vec<PathBuf> = entries
+            .map(|entry| entry.map(|entry| entry.path()))
+            .collect::<Result<_, _>>()
+            .map_err(failed)?;
+        paths.retain(|path| path.extension().is_some_and(|extension| extension == "json"));
+        let mut stored = paths
+            .into_iter()
+            .map(file::read)
+            .collect::<Result<Vec<Stored>, _>>()?;
+        stored.sort_by(|a, b| {
+            let key = |stored: &Stored| stored.certificate.number;
+            key(a)
+                .cmp(&key(b))
+                .then_with(|| a.certificate.id.cmp(&b.certificate.id))
+        });
+        Ok(stored)
     }
 }
 
-/// How long ago a time was, RFC 3339; `None`: it is none. One that is still to come is no age.
-fn age(made: &str, now: SystemTime) -> Option<Duration> {
-    let made = humantime::parse_rfc3339(made).ok()?;
-    Some(now.duration_since(made).unwrap_or_default())
+/// How long ago a time was; one that is still to come, by less than clocks differ, is no age.
+fn age(made: SystemTime, now: SystemTime) -> Duration {
+    now.duration_since(made).unwrap_or_default()
 }
 
 #[cfg(test)]
-mod tests {
-    use rig::{Conditions, White};
-
-    use super::*;
-
-    fn certificate(rig: &RigFile, id: &str, made: &str) -> Certificate {
-        let conditions = Conditions {
-            made: made.to_owned(),
-            ..Conditions::default()
-        };
-        Certificate {
-            id: id.to_owned(),
-            made: made.to_owned(),
-            rig: rig.fingerprint.clone(),
-            white: Some(White {
-                conditions,
-                ..White::nominal(rig)
-            }),
-            ..Certificate::default()
-        }
-    }
-
-    #[test]
-    fn a_run_gets_the_newest_certificate_of_its_rig_and_no_old_one() {
-        let directory = tempfile::tempdir().unwrap();
-        let certificates = Certificates::at(directory.path().join("calibrations"));
-        let rig = RigFile::default();
-        let now = humantime::parse_rfc3339("2026-03-01T00:00:00Z").unwrap();
-        let refused = |rig: &RigFile| certificates.valid(rig, now).unwrap_err().to_string();
-        assert!(
-            refused(&rig).contains("there is none for this rig file"),
-            "{}",
-            refused(&rig)
-        );
-
-        fs::create_dir(certificates.path()).unwrap();
-        certificates
-            .keep(&certificate(&rig, "01A", "2026-01-01T00:00:00Z"))
-            .unwrap();
-        assert!(
-            refused(&rig).contains("max_age_h allows 720.0 h"),
-            "{}",
-            refused(&rig)
-        );
-        certificates
-            .keep(&certificate(&rig, "01B", "2026-02-20T00:00:00Z"))
-            .unwrap();
-        assert_eq!(certificates.valid(&rig, now).unwrap().id, "01B");
-
-        let changed = RigFile::parse("[light]\nzero_deg = 181", "rig.toml".as_ref()).unwrap();
-        assert!(
-            refused(&changed).contains("there is none"),
-            "{}",
-            refused(&changed)
-        );
-        fs::write(certificates.path().join("02.json"), "{").unwrap();
-        assert!(certificates.newest(&rig).is_err());
-    }
-}
+mod tests;

@@ -40,7 +40,7 @@ struct Histogram([[f64; BINS]; BINS]);
 /// # Errors
 /// A file that cannot be read; a name that leads out of the folder; weights or angles that are not what is allowed.
 pub fn job_text(path: &Path) -> Result<String, SessionError> {
-    let mut text = read("job file", path, |path| std::fs::read_to_string(path))?;
+    let mut text = read("job file", path, config::read_text)?;
     // What is wrong with it is told by who reads all of it.
     let named = toml::from_str::<Naming>(&text).ok();
     let Some(directions) = named.and_then(|job| job.scene?.directions) else {
@@ -106,9 +106,11 @@ impl Histogram {
             weight: f64,
         }
         let name = path.to_string_lossy();
-        let file = read("histogram of directions", path, |path| std::fs::File::open(path))?;
+        let text = read("histogram of directions", path, config::read_text)?;
         let mut histogram = Self::empty();
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
+        let mut reader = csv::ReaderBuilder::new()
+            .trim(csv::Trim::All)
+            .from_reader(text.as_bytes());
         // The header is line 1.
         for (row, line) in reader.deserialize().zip(2..) {
             let row: Row = row.map_err(|error| {

@@ -49,6 +49,23 @@ pub enum SessionError {
         /// What is missing.
         why: String,
     },
+    /// The file of a stored calibration is damaged, was edited, or says what no rig of the rig file can have.
+    #[error(
+        "the calibration {}: {why}. Restore the file from a copy, or move it out of its directory and calibrate anew with `gonioctl calibrate`",
+        .path.display()
+    )]
+    Certificate {
+        /// Its file.
+        path: PathBuf,
+        /// The key, what was found and what is allowed, where a value is wrong.
+        why: String,
+    },
+    /// This computer's clock cannot be right, and what is made now would be dated wrongly.
+    #[error("nothing is calibrated: {why}")]
+    Clock {
+        /// What it says, what speaks against it, and what to do.
+        why: String,
+    },
     /// Run directories cannot be made there.
     #[error("cannot make run directories in {}", .path.display())]
     Out {
@@ -64,6 +81,12 @@ pub enum SessionError {
         kind: FaultKind,
         /// What failed.
         source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// The rig file has changed since the run began in more than its port.
+    #[error("the rig file is not the one with which run {run} began: only [bus] and [sim] may differ")]
+    OtherRig {
+        /// Which run.
+        run: String,
     },
     /// The journal cannot be opened, or not written any more.
     #[error(transparent)]
@@ -90,7 +113,10 @@ impl SessionError {
         }
         match self {
             Self::NotReady { kind: fault, .. } => kind(*fault),
-            Self::Rig(error) | Self::Port { source: error, .. } => kind(rig::Fault::kind(error.as_ref())),
+            Self::Rig(error) => kind(rig::Fault::kind(error.as_ref())),
+            // The rig file is sound; what it names is absent, in use, not permitted or not a serial port. `doctor` says
+            // the same of each.
+            Self::Port { .. } => Status::Rig,
             Self::Job(sweep::SweepError::Start { .. })
             | Self::Capture(capture::CaptureError::OtherDevices { .. }) => Status::Rig,
             Self::Capture(capture::CaptureError::Journal(_)) => Status::Stopped,

@@ -21,5 +21,5 @@ pub use error::{SessionError, is_disk_full};
 pub use open_rig::{OpenRig, PortOfFile, RigSource};
 pub use rig_port::RigPort;
 pub use run::{Ended, extension_planner, prepare_output, resume, run, run_directory_name};
-pub use run_request::{RunRequest, rig_file, rig_text};
+pub use run_request::{RunRequest, rig_file, rig_text, same_rig};
 pub use status::Status;

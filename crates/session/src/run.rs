@@ -71,12 +71,14 @@ pub async fn run(
     .await
 }
 
-/// Goes on with a run that was stopped or failed; a run that is done already is only reported again.
+/// Goes on with a run that was interrupted; a run that is done already is only reported again. `rig` is a rig file that
+/// says where the rig is now, where that has changed; see [`RunRequest::resumed_on`].
 ///
 /// # Errors
-/// As [`run`]; and a directory that holds no run.
+/// As [`run`]; and a directory that holds no run, or a rig file of another rig.
 pub async fn resume(
     directory: &Path,
+    rig: Option<&Path>,
     control: watch::Receiver<Command>,
     on_event: &mut (dyn FnMut(Event) + Send),
 ) -> Result<Ended, SessionError> {
@@ -93,7 +95,10 @@ pub async fn resume(
             report,
         });
     }
-    let order = RunRequest::resumed(header)?;
+    let order = match rig {
+        Some(rig) => RunRequest::resumed_on(header, rig)?,
+        None => RunRequest::resumed(header)?,
+    };
     let mut station = OpenRig::open(&order.rig, &order.rig_name)?;
     finish(
         directory,

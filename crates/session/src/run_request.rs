@@ -1,10 +1,10 @@
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
-use std::{fs, io};
 
 use arms::Pose;
 use capture::Header;
-use rig::{Certificate, RigFile};
+use rig::{Certificate, RigFile, WallClock};
 use sweep::{Job, Light, Plan};
 use ulid::Ulid;
 
@@ -49,6 +49,23 @@ impl RunRequest {
         Self::parse(job, "the run's job file", rig, Path::new("the run's rig file"))
     }
 
+    /// The order of a run that was begun before, on the rig that a file describes now. Only where the rig is connected
+    /// (`[bus]`) and the simulator (`[sim]`) may differ from the rig file with which the run began.
+    ///
+    /// # Errors
+    /// Texts that this version does not accept any more; a rig file that cannot be read, is wrong, or describes
+    /// another rig.
+    pub fn resumed_on(header: &Header, rig: &Path) -> Result<Self, SessionError> {
+        let (text, name) = rig_text(Some(rig))?;
+        let file = RigFile::parse(&text, &name)?;
+        same_rig(header, &file)?;
+        Ok(Self {
+            rig: file,
+            rig_name: name.display().to_string(),
+            ..Self::resumed(header)?
+        })
+    }
+
     /// Reads the texts of a job file and of a rig file; the names are what messages call them.
     ///
     /// # Errors
@@ -90,10 +107,18 @@ impl RunRequest {
     /// There is no valid one.
     pub fn certificate(&self, now: SystemTime) -> Result<Option<Certificate>, SessionError> {
         let settings = &self.rig.certificates;
-        settings
-            .required
-            .then(|| Certificates::at(&settings.directory).valid(&self.rig, now))
-            .transpose()
+        let clock = WallClock::at(now);
+        if !settings.required {
+            if let Some(why) = clock.fault() {
+                tracing::warn!("{why}");
+            }
+            return Ok(None);
+        }
+        let certificate = Certificates::at(&settings.directory).valid(&self.rig, clock)?;
+        for remark in &certificate.remarks {
+            tracing::warn!("calibration {}: {remark}", certificate.id);
+        }
+        Ok(Some(certificate))
     }
 
     /// What the order becomes on its rig, with the arms standing at `start`.
@@ -110,6 +135,22 @@ impl RunRequest {
     }
 }
 
+/// Checks that a rig is the one with which a run began: only where it is connected, and the simulator, may differ.
+///
+/// # Errors
+/// It is another one; the run's rig file is not accepted any more.
+pub fn same_rig(header: &Header, rig: &RigFile) -> Result<(), SessionError> {
+    let mut began = RigFile::parse(&header.rig, Path::new("the run's rig file"))?;
+    began.bus = rig.bus.clone();
+    began.sim = rig.sim.clone();
+    if began != *rig {
+        return Err(SessionError::OtherRig {
+            run: header.run.clone(),
+        });
+    }
+    Ok(())
+}
+
 /// Text of a rig file and what messages call it: the file named, else config/rig.toml in the working directory if there
 /// is one, else the built-in one.
 ///
@@ -117,16 +158,10 @@ impl RunRequest {
 /// The file cannot be read.
 pub fn rig_text(rig: Option<&Path>) -> Result<(String, PathBuf), SessionError> {
     match rig {
-        Some(path) => Ok((
-            read("rig file", path, |path| fs::read_to_string(path))?,
-            path.to_owned(),
-        )),
+        Some(path) => Ok((read("rig file", path, config::read_text)?, path.to_owned())),
         None if Path::new(RIG_HERE).exists() => {
             let here = Path::new(RIG_HERE);
-            Ok((
-                read("rig file", here, |path| fs::read_to_string(path))?,
-                here.to_owned(),
-            ))
+            Ok((read("rig file", here, config::read_text)?, here.to_owned()))
         }
         None => Ok((RigFile::BUILT_IN.to_owned(), PathBuf::from("built-in rig file"))),
     }

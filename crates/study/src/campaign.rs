@@ -18,7 +18,7 @@ const WAITING: usize = 4;
 
 /// Many captures on the simulated rig, each with a few random faults, from one seed.
 ///
-/// Each must end complete and true, or with a clear fault and in a safe state (lamp off, arms standing), from which
+/// Each must end complete and true, complete and not to be believed by its own report, or with a clear fault and in a safe state (lamp off, arms standing), from which
 /// it is resumed once what was wrong is mended: no hang, no panic, no doubled or silently wrong reading.
 #[derive(Clone, Copy, Debug)]
 pub struct Campaign {
@@ -39,6 +39,8 @@ pub struct Campaigned {
     pub executions: u64,
     /// Faults of all scripts.
     pub faults: u64,
+    /// Captures of which the report says that they are not to be believed, as it should.
+    pub bad: u64,
     /// Readings that were compared with the truth.
     pub readings: u64,
     /// Captures that went wrong.
@@ -59,6 +61,8 @@ pub struct Wrong {
 pub struct Carried {
     /// Executions: one, and one for each resumption.
     pub executions: u64,
+    /// Whether the report says that it is not to be believed: nothing was compared.
+    pub bad: bool,
     /// Readings that were compared with the truth.
     pub readings: u64,
 }
@@ -108,6 +112,7 @@ impl Campaigned {
         match carried {
             Ok(carried) => {
                 self.executions += carried.executions;
+                self.bad += u64::from(carried.bad);
                 self.readings += carried.readings;
             }
             Err(wrong) => self.wrong.push(wrong),

@@ -9,9 +9,13 @@ pub(crate) struct Check<'a> {
 impl Check<'_> {
     /// The text as a table.
     pub(crate) fn parse<T: serde::de::DeserializeOwned>(&self, text: &str) -> Result<T, Error> {
-        toml::from_str(text).map_err(|error| Error::Syntax {
-            file: self.file.to_owned(),
-            message: error.to_string(),
+        config::parse(text).map_err(|flaws| {
+            let line = flaws.line(text).map(|line| format!("line {line}: "));
+            let key = flaws.first().key.as_ref().map(|key| format!("{key}: "));
+            Error::Syntax {
+                file: self.file.to_owned(),
+                message: [line, key, Some(flaws.why(text))].into_iter().flatten().collect(),
+            }
         })
     }
 

@@ -102,7 +102,7 @@ impl Study {
 
 /// The text of a study file.
 pub(crate) fn read(path: &Path) -> Result<String, Error> {
-    fs::read_to_string(path).map_err(|source| Error::Io {
+    config::read_text(path).map_err(|source| Error::Io {
         what: "read",
         path: path.to_owned(),
         source,

@@ -1,5 +1,6 @@
 use std::ops::{Range, RangeInclusive};
 
+use config::Flaws;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -114,15 +115,14 @@ impl Source<'_> {
         }
     }
 
-    /// What toml itself refuses: syntax, unknown keys, missing keys, wrong types.
-    fn toml(&self, error: &toml::de::Error) -> SweepError {
-        let key = error.span().and_then(|span| {
-            let line = self.text.lines().nth(self.line(&span) - 1)?;
-            let key = line.split('=').next()?.trim();
-            (!key.is_empty()).then(|| key.to_owned())
-        });
-        let why = error.message().lines().collect::<Vec<_>>().join(", ");
-        self.refuse(error.span(), key.unwrap_or_else(|| "job file".to_owned()), why)
+    /// What is no job file at all: syntax, unknown keys, missing keys, wrong types.
+    fn form(&self, flaws: &Flaws) -> SweepError {
+        let key = flaws.first().key.clone();
+        self.refuse(
+            flaws.first().span.clone(),
+            key.unwrap_or_else(|| "job file".to_owned()),
+            flaws.why(self.text),
+        )
     }
 
     fn within<T: PartialOrd + Copy + std::fmt::Display>(
@@ -162,7 +162,7 @@ impl Job {
     /// 12 planes, or none without a target or a budget.
     pub fn parse(text: &str, name: &str) -> Result<Self, SweepError> {
         let source = Source { text, name };
-        let raw: RawJob = toml::from_str(text).map_err(|error| source.toml(&error))?;
+        let raw: RawJob = config::parse(text).map_err(|flaws| source.form(&flaws))?;
         let until = raw
             .sweep
             .as_ref()

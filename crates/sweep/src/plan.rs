@@ -83,8 +83,11 @@ pub struct Plan {
     pub steps: Vec<Step>,
     /// What was left out and why.
     pub left_out: Vec<LeftOut>,
-    /// Seconds before the first step and after the last: warm-up of the lamp.
+    /// Seconds between the steps: warm-up of the lamp.
     pub overhead_s: f64,
+    /// Seconds of the last look at the dark, after the last step.
+    #[serde(default)]
+    pub closing_s: f64,
     /// Whether further steps may be added once these are done.
     #[serde(default)]
     pub open: bool,
@@ -93,6 +96,6 @@ pub struct Plan {
 impl Plan {
     /// Estimated seconds of rig time.
     pub fn seconds(&self) -> f64 {
-        self.overhead_s + self.steps.iter().map(|step| step.seconds).sum::<f64>()
+        self.overhead_s + self.closing_s + self.steps.iter().map(|step| step.seconds).sum::<f64>()
     }
 }

@@ -122,6 +122,7 @@ fn lay(
         steps: draft.steps,
         left_out,
         overhead_s: mechanics.warm_up_s,
+        closing_s: closing_s(mechanics),
         open: false,
     };
     check(&plan.steps, mechanics, start.pose)?;
@@ -206,6 +207,7 @@ pub fn visits(name: &str, visits: &[Visit], mechanics: &Mechanics) -> Result<Pla
         steps: draft.steps,
         left_out: Vec::new(),
         overhead_s: mechanics.warm_up_s,
+        closing_s: closing_s(mechanics),
         open: false,
     };
     check(&plan.steps, mechanics, start.pose)?;
@@ -463,6 +465,12 @@ fn darks(mechanics: &Mechanics) -> impl Iterator<Item = (u8, u32)> + use<> {
     (0..GAINS)
         .flat_map(move |gain| integration_us.map(|us| (gain, us)))
         .flat_map(|exposure| [exposure; DARK_REPEATS])
+}
+
+/// Seconds of the last look at the dark: one of the longest exposures, where the arms stand.
+fn closing_s(mechanics: &Mechanics) -> f64 {
+    let [_, longest_us] = mechanics.integration_us;
+    f64::from(longest_us) * 1e-6 + mechanics.transaction_s
 }
 
 /// Looks at every leg once more.

@@ -26,11 +26,18 @@ impl WireSettings {
     /// # Errors
     /// An unknown key, a wrong type, a value out of its range.
     pub fn new(rig: &RigFile) -> Result<Self, SimError> {
-        let raw = match rig.sim.get("wire") {
+        let form = |why: String| SimError::Form {
+            why: format!("wire: {why}"),
+        };
+        let raw: RawWire = match rig.sim.get("wire") {
             None => RawWire::default(),
-            Some(table) => RawWire::deserialize(table.clone()).map_err(|error| SimError::Form {
-                why: format!("wire: {}", error.message()),
-            })?,
+            Some(toml::Value::Table(table)) => crate::settings::read(table).map_err(form)?,
+            Some(other) => {
+                return Err(form(format!(
+                    "{} stands there, a table is wanted",
+                    other.type_str()
+                )));
+            }
         };
         Ok(Self {
             deadline: ms("wire.deadline_ms", raw.deadline_ms, 0.1)?,

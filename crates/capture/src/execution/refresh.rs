@@ -68,12 +68,17 @@ impl<R: Rig> Execution<'_, R> {
         };
         self.append(&Record::Extension(extension.clone())).await?;
         self.add(extension.steps);
-        for index in begin..self.plan.steps.len() {
-            let step = self.plan.steps[index].clone();
+        let added = self.plan.steps[begin..].to_vec();
+        for set in added.chunk_by(|a, b| a.sweep == Sweep::Dark && b.sweep == Sweep::Dark) {
+            let step = &set[0];
             // Their own paths lead on from nowhere.
             self.standing = self.standing.filter(|&pose| pose == step.pose());
+            if step.sweep == Sweep::Dark {
+                self.dark_set(set).await?;
+                continue;
+            }
             self.obey().await?;
-            self.step(&step).await?;
+            self.step(step).await?;
         }
         // The path of the step with which the run goes on leads from the step before it.
         self.standing = None;

@@ -1,4 +1,4 @@
-use rig::{Device, DriveError, FaultKind, Rig};
+use rig::{DarkFault, Device, DriveError, FaultKind, Rig};
 use sweep::SweepError;
 use tokio::sync::watch;
 
@@ -20,6 +20,10 @@ pub(crate) enum Interrupt<E: rig::Fault> {
     Way(SweepError),
     /// The lamp is out although it was switched on.
     Lamp,
+    /// The dark readings cannot be believed.
+    Dark(DarkFault),
+    /// This computer slept, or the program was stopped, and what the watchdogs did then was seen; in words.
+    StoodStill(String),
     Refused(CaptureError),
 }
 
@@ -41,10 +45,18 @@ impl<R: Rig> Execution<'_, R> {
         mut self,
         result: Result<(), Interrupt<R::Error>>,
     ) -> Result<Outcome, CaptureError> {
+        let result = match result {
+            Err(interrupt) => Err(self.explain(interrupt)),
+            done => done,
+        };
         match &result {
             Err(Interrupt::Fault(error)) => self.tell_fault(error.kind(), error.device(), chain(error)),
+            Err(Interrupt::StoodStill(why)) => self.tell_fault(FaultKind::StoodStill, None, why.clone()),
             Err(Interrupt::Lamp) => {
                 self.tell_fault(FaultKind::Hardware, Some(Device::Photometer), LAMP_OUT.to_owned());
+            }
+            Err(Interrupt::Dark(fault)) => {
+                self.tell_fault(FaultKind::Light, Some(Device::Photometer), fault.to_string());
             }
             Err(Interrupt::Way(error)) => self.tell_fault(FaultKind::Refused, None, chain(error)),
             _ => {}
@@ -79,6 +91,10 @@ impl<R: Rig> Execution<'_, R> {
             },
             Err(Interrupt::Fault(fault)) => Outcome::Failed { fault: chain(&fault) },
             Err(Interrupt::Way(error)) => Outcome::Failed { fault: chain(&error) },
+            Err(Interrupt::Dark(fault)) => Outcome::Failed {
+                fault: fault.to_string(),
+            },
+            Err(Interrupt::StoodStill(fault)) => Outcome::Failed { fault },
             Err(Interrupt::Lamp) => Outcome::Failed {
                 fault: LAMP_OUT.to_owned(),
             },
@@ -129,6 +145,26 @@ impl<R: Rig> Execution<'_, R> {
                 }
             }
         }
+    }
+
+    /// What looks like a fault of a device, and is what the watchdogs do while nobody speaks to them, is told as that.
+    fn explain(&self, interrupt: Interrupt<R::Error>) -> Interrupt<R::Error> {
+        let Some(gap) = self.drive.stood_still() else {
+            return interrupt;
+        };
+        let seen = match &interrupt {
+            Interrupt::Lamp => LAMP_OUT.to_owned(),
+            Interrupt::Fault(error) if matches!(error.kind(), FaultKind::Motion | FaultKind::Refused) => {
+                chain(error)
+            }
+            _ => return interrupt,
+        };
+        Interrupt::StoodStill(format!(
+            "this computer or program stood still for {:.1} s (sleep, Ctrl-Z, or its clock was set), longer than \
+             motion.watchdog_ms: the arms were stopped and the lamp was put out by their watchdogs, as they should be \
+             (seen as: {seen})",
+            gap.as_secs_f64()
+        ))
     }
 
     fn tell_fault(&mut self, kind: FaultKind, device: Option<Device>, fault: String) {

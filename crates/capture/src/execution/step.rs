@@ -98,9 +98,18 @@ impl<R: Rig> Execution<'_, R> {
 
     /// Drives to a step's pose; from wherever the arms are where its own path does not lead on.
     pub(super) async fn travel(&mut self, step: &Step) -> Result<Pose, Interrupt<R::Error>> {
-        let measured = match self.standing {
-            Some(_) => self.drive.travel(&step.path).await?.pose(),
-            None => self.travel_anew(step.pose()).await?,
+        // What was added to a plan may be left over from an interruption, and its path lead from elsewhere.
+        let leads = |from| {
+            let mut poses = std::iter::once(from).chain(step.path.iter().copied());
+            let mut last = poses.next();
+            poses.all(|to| {
+                last.replace(to)
+                    .is_none_or(|from| self.file.envelope.check_path(from, to).is_ok())
+            })
+        };
+        let measured = match self.standing.is_some_and(leads) {
+            true => self.drive.travel(&step.path).await?.pose(),
+            false => self.travel_anew(step.pose()).await?,
         };
         self.standing = Some(step.pose());
         Ok(measured)

@@ -132,6 +132,7 @@ impl<R: Rig> Execution<'_, R> {
         if self.lamp_is_out(counts) {
             return Err(Interrupt::Lamp);
         }
+        self.drive.is_sound();
         if self.file.visits.lamp == Lamp::Monitor {
             self.note_lamp(counts);
         }

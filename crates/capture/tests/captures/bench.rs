@@ -58,6 +58,15 @@ impl MemoryJournal {
             .collect()
     }
 
+    /// Steps of the plan and of all that was added to it.
+    pub(crate) fn step_count(&self) -> usize {
+        let added = self.records.iter().map(|record| match record {
+            Record::Extension(extension) => extension.steps.len(),
+            _ => 0,
+        });
+        self.plan().steps.len() + added.sum::<usize>()
+    }
+
     pub(crate) fn plan(&self) -> &Plan {
         match &self.records[0] {
             Record::Header(header) => &header.plan,

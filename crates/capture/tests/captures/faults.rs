@@ -3,7 +3,7 @@ use std::time::Duration;
 use capture::{Event, Outcome, Record};
 use firmware_sim::{Disturbance, Fault};
 use rig::dynamixel::register::{common, servo};
-use rig::{Device, RigFile};
+use rig::{Device, FaultKind, RigFile};
 
 use crate::bench::{SERVOS, SHORT, Scene, assert_complete, peek};
 
@@ -226,4 +226,35 @@ async fn a_tripped_watchdog_is_a_fault_and_is_cleared_on_resuming() {
     assert!(fault.contains("watchdog"), "{fault}");
     assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
     assert_complete(&scene.journal);
+}
+
+#[tokio::test(start_paused = true)]
+async fn a_computer_that_slept_is_no_failed_device_and_the_run_can_be_resumed() {
+    // In the dark readings, in the plane and in the arc.
+    for after in [2, 12, 34] {
+        let mut scene = Scene::new(SHORT, "").await;
+        let (mut readings, mut kinds) = (0, Vec::new());
+        let outcome = scene.run(|event| match event {
+            Event::Reading { .. } => {
+                readings += 1;
+                if readings == after {
+                    // Nobody speaks to the devices meanwhile, as while a computer sleeps.
+                    tokio::spawn(tokio::time::advance(Duration::from_secs(5)));
+                }
+            }
+            Event::Fault { kind, device, .. } => kinds.push((kind, device)),
+            _ => {}
+        });
+        let fault = fault(outcome.await.expect("the journal is sound"));
+        assert!(
+            fault.starts_with("this computer or program stood still for 5."),
+            "{after}: {fault}"
+        );
+        assert_eq!(kinds, [(FaultKind::StoodStill, None)], "{after}");
+        scene.assert_safe();
+
+        assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
+        assert_complete(&scene.journal);
+        scene.assert_safe();
+    }
 }

@@ -18,6 +18,7 @@ fn header() -> Header {
             steps: Vec::new(),
             left_out: Vec::new(),
             overhead_s: 0.2,
+            closing_s: 0.1,
             open: false,
         },
         started: "2026-11-22T04:00:00Z".to_owned(),

@@ -5,6 +5,7 @@ mod extensions;
 mod faults;
 mod fly;
 mod journal;
+mod light;
 mod operator;
 mod suspend;
 mod time;

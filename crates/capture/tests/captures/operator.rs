@@ -219,7 +219,8 @@ async fn a_pause_holds_everything_until_it_ends() {
             Event::State {
                 state: State::Running,
             } if paused_at.is_some() => {
-                let (since, pose) = paused_at.expect("just asked");
+                // Once: the lamp, put out for fresh dark readings, warms up again after that.
+                let (since, pose) = paused_at.take().expect("just asked");
                 assert!(bench.now() - since >= Duration::from_secs(300));
                 assert_eq!(bench.pose(), pose);
                 assert_eq!(
@@ -450,7 +451,7 @@ async fn a_resumed_run_tells_by_how_much_a_pose_differs_now() {
         .journal
         .records
         .iter()
-        .filter(|record| matches!(record, Record::Repeat { .. }));
+        .filter(|record| matches!(record, Record::Repeat { reading, .. } if reading.lamp));
     assert_eq!(repeats.count(), 1, "and the journal has it");
     assert_complete(&scene.journal);
 }
@@ -546,4 +547,43 @@ async fn a_capture_can_run_in_a_task_of_its_own() {
     let mut scene = Scene::new(SHORT, "").await;
     let task = tokio::spawn(async move { scene.run(|_| ()).await.unwrap() });
     assert_eq!(task.await.unwrap(), Outcome::Done);
+}
+
+/// The dark readings that follow a pause are interrupted in their turn: what is left of them is taken at the end of the run, from
+/// wherever the arms are then.
+#[tokio::test(start_paused = true)]
+async fn dark_readings_after_a_pause_can_be_interrupted_too() {
+    for at in [25, 30, 36, 42] {
+        let mut scene = Scene::new(SHORT, "").await;
+        let control = scene.control.clone();
+        let mut pause = after(at, &scene.control, Command::Pause);
+        let mut paused = false;
+        let outcome = scene.run(|event| {
+            match &event {
+                Event::State { state: State::Paused } => {
+                    paused = true;
+                    control.send_replace(Command::Run);
+                }
+                Event::Step {
+                    sweep: sweep::Sweep::Dark,
+                    ..
+                } if paused => {
+                    control.send_replace(Command::Stop);
+                }
+                _ => {}
+            }
+            if !paused {
+                pause(event);
+            }
+        });
+        assert_eq!(outcome.await.unwrap(), Outcome::Stopped, "paused after {at}");
+        scene.control.send_replace(Command::Run);
+        assert_eq!(
+            scene.run(|_| ()).await.unwrap(),
+            Outcome::Done,
+            "paused after {at}"
+        );
+        assert_complete(&scene.journal);
+        scene.assert_safe();
+    }
 }

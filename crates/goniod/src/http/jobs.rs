@@ -30,12 +30,16 @@ struct Naming {
     name: Option<String>,
 }
 
-/// All jobs, the queue among them, in the order in which they are worked off.
+/// The jobs in the order in which they are worked off, by `place`: the latest that are over, then the queue.
 #[utoipa::path(get, path = "/jobs", tag = "queue", responses((status = 200, body = Vec<Job>)))]
 async fn jobs(State(shared): State<Shared>) -> Result<Response, Problem> {
     let daemon = shared.daemon.clone();
     shared
-        .work(async move { long_json(daemon.jobs().await?).await })
+        .work(async move {
+            let mut jobs = daemon.jobs().await?;
+            jobs.sort_by_key(|job| job.place);
+            long_json(jobs).await
+        })
         .await
 }
 
@@ -116,6 +120,20 @@ fn job_id(id: &str) -> Result<JobId, Problem> {
         .map_err(|_| Problem::new(StatusCode::NOT_FOUND, "there is no such job"))
 }
 
+/// What is said of a job file whose line breaks were lost on the way.
+const UNBROKEN: &str = "the job file has lost its line breaks: `curl -d @FILE` drops them, `curl --data-binary @FILE` \
+                        keeps them";
+
+/// Whether a job file has lost its line breaks: it is all in one line, with a table or more than one key in it, or all
+/// of it a comment. A job that really is one line has one key, as each has a line of its own.
+fn unbroken(text: &str) -> bool {
+    let text = text.trim();
+    let one_line = !text.contains(['\n', '\r']);
+    one_line
+        && (text.starts_with('#') || text.contains("[[") || text.matches('=').count() > 1)
+        && toml::from_str::<toml::Table>(text).map_or(true, |table| table.is_empty())
+}
+
 /// The job file of a body as TOML: as it came, or made of JSON with the same keys.
 fn job_text(headers: &HeaderMap, text: &[u8]) -> Result<String, Problem> {
     let wrong = |why: String| Problem::new(StatusCode::UNPROCESSABLE_ENTITY, why);
@@ -124,8 +142,19 @@ fn job_text(headers: &HeaderMap, text: &[u8]) -> Result<String, Problem> {
             let job: toml::Table = body::json(headers, text)?;
             toml::to_string(&job).map_err(|error| wrong(format!("this JSON is no job file: {error}")))
         }
-        "application/toml" => String::from_utf8(text.to_vec())
-            .map_err(|error| wrong(format!("the job file is not UTF-8: {error}"))),
+        "application/toml" => {
+            let text =
+                config::decode(text.to_vec()).map_err(|error| wrong(format!("the job file: {error}")))?;
+            if unbroken(&text) {
+                return Err(wrong(UNBROKEN.to_owned()));
+            }
+            Ok(text)
+        }
+        "application/x-www-form-urlencoded" => Err(Problem::new(
+            StatusCode::UNSUPPORTED_MEDIA_TYPE,
+            "the body is a form, as `curl -d` says unless told otherwise; send a job file with `curl -H 'Content-Type: \
+             application/toml' --data-binary @FILE`",
+        )),
         other => Err(Problem::new(
             StatusCode::UNSUPPORTED_MEDIA_TYPE,
             format!("the body is {other:?}, taken are application/toml and application/json"),

@@ -95,13 +95,14 @@ impl Tokens {
             let path = path.to_owned();
             return Err(TokenError::Open { path, mode });
         }
-        let mut text = String::new();
-        file.read_to_string(&mut text).map_err(failed(path))?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).map_err(failed(path))?;
         let wrong = |why: String| TokenError::Text {
             path: path.to_owned(),
             why,
         };
-        let tokens: Self = toml::from_str(&text).map_err(|error| wrong(error.message().to_owned()))?;
+        let text = config::decode(bytes).map_err(|error| wrong(error.to_string()))?;
+        let tokens: Self = config::parse(&text).map_err(|flaws| wrong(flaws.to_string()))?;
         for (key, token) in [("watch", &tokens.watch), ("operate", &tokens.operate)] {
             if token.len() < SHORTEST || !token.bytes().all(|byte| byte.is_ascii_graphic()) {
                 return Err(wrong(format!(

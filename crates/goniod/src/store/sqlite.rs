@@ -13,10 +13,14 @@ use sqlx::sqlite::{
 use super::{Store, StoreError};
 use crate::{FaultId, FaultView, Job, JobId, RunView, VerdictView};
 
+mod copy;
 mod row;
+mod soundness;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use copy::has_log;
+pub use copy::{backup, restore};
 use row::{column, failed, job, json, kind, number, of_word, run, word};
 
 /// How long a statement waits for another program that holds the database.
@@ -40,10 +44,10 @@ pub struct Sqlite {
 }
 
 impl Sqlite {
-    /// Opens the file, makes it where it is missing, and brings its tables up to date.
+    /// Opens the file, makes it where it is missing, checks that it is whole, and brings its tables up to date.
     ///
     /// # Errors
-    /// The file cannot be opened or written, is no database, or was made by a newer version.
+    /// The file cannot be opened or written, is damaged, is no database, or was made by a newer version.
     pub async fn open(path: &Path) -> Result<Self, StoreError> {
         Self::with(path, SqliteConnectOptions::new()).await
     }
@@ -62,11 +66,13 @@ impl Sqlite {
                 .idle_timeout(None)
                 .max_lifetime(None)
         };
-        let cannot = |source| StoreError::Open {
-            path: path.to_owned(),
-            source,
-        };
+        let cannot = |source| soundness::damage(path, source);
         let writer = pool().connect_with(options.clone()).await.map_err(cannot)?;
+        // Before anything is written: what is damaged must not be made worse.
+        if let Err(error) = soundness::check(&writer, path).await {
+            writer.close().await;
+            return Err(error);
+        }
         migrations()
             .run(&writer)
             .await

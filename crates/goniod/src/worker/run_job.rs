@@ -1,5 +1,5 @@
 use arms::Pose;
-use capture::{Command, Header, Journal, Outcome, Record};
+use capture::{Command, Journal, Outcome, Record};
 use report::RunDirectory;
 
 use super::observer::Observer;
@@ -60,7 +60,7 @@ impl<S: RigSource> RigWorker<S> {
         let Some(Record::Header(header)) = journal.records().first() else {
             return Err(capture::CaptureError::NoHeader.into());
         };
-        self.same_rig(header)?;
+        session::same_rig(header, &self.shared.rig)?;
         let captured = match report::Run::new(header, journal.records()).complete() {
             true => (Outcome::Done, None),
             false => self.capture(&run, &mut journal, permit).await?,
@@ -119,19 +119,6 @@ impl<S: RigSource> RigWorker<S> {
     /// Asks every device who it is and where it stands; moves nothing.
     async fn identify(&mut self) -> Result<Pose, DaemonError> {
         Ok(self.open()?.start().await?)
-    }
-
-    /// A run goes on with the rig with which it began; only where that is connected may differ.
-    fn same_rig(&self, header: &Header) -> Result<(), DaemonError> {
-        let mut began = rig::RigFile::parse(&header.rig, "the run's rig file".as_ref())?;
-        began.bus = self.shared.rig.bus.clone();
-        began.sim = self.shared.rig.sim.clone();
-        if began != self.shared.rig {
-            return Err(DaemonError::OtherRig {
-                run: header.run.clone(),
-            });
-        }
-        Ok(())
     }
 
     async fn capture(
@@ -193,7 +180,7 @@ fn ending(error: &DaemonError) -> (Ending, Option<FaultCode>) {
         DaemonError::Session(
             SessionError::Journal(error) | SessionError::Capture(capture::CaptureError::Journal(error)),
         ) => store_code(error),
-        DaemonError::Session(SessionError::Capture(_)) | DaemonError::OtherRig { .. } => FaultCode::Mismatch,
+        DaemonError::Session(SessionError::Capture(_) | SessionError::OtherRig { .. }) => FaultCode::Mismatch,
         error if is_disk_full(error) => FaultCode::DiskFull,
         DaemonError::Session(SessionError::Report(_)) => FaultCode::Report,
         _ => FaultCode::Setup,

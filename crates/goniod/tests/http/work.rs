@@ -186,3 +186,60 @@ async fn an_emergency_stop_holds_until_it_is_acknowledged() {
     );
     service.end().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn jobs_are_listed_in_the_order_in_which_they_are_worked_off() {
+    let service = Service::start().await;
+    let mut submitted = Vec::new();
+    for _ in 0..5 {
+        submitted.push(service.submit().await);
+    }
+    // Some are over, and neither the first nor the last alone.
+    for over in [1, 3] {
+        let answer = service
+            .post(&format!("/api/v1/jobs/{}/cancel", submitted[over]))
+            .await;
+        assert_eq!(answer.status, 200, "{answer:?}");
+    }
+    let jobs = service.get("/api/v1/jobs").await.json();
+    let jobs = jobs.as_array().unwrap();
+    let ids: Vec<_> = jobs.iter().map(|job| job["id"].as_str().unwrap()).collect();
+    assert_eq!(ids, submitted);
+    assert!(jobs.is_sorted_by_key(|job| job["place"].as_u64().unwrap()));
+    service.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_curl_does_to_a_job_file_is_told() {
+    let service = Service::start().await;
+    let unbroken: String = JOB.lines().collect();
+    let commented: String = format!("# A job\n{JOB}").lines().collect();
+    for (body, headers) in [
+        (unbroken.as_str(), TOML),
+        (&commented, TOML),
+        (JOB, "Content-Type: application/x-www-form-urlencoded\r\n"),
+    ] {
+        for path in ["/api/v1/jobs", "/api/v1/plan"] {
+            let answer = service.ask("POST", path, headers, body).await;
+            assert!([415, 422].contains(&answer.status), "{answer:?}");
+            let detail = answer.json()["detail"].as_str().unwrap().to_owned();
+            assert!(detail.contains("--data-binary"), "{detail}");
+        }
+    }
+    // One line that is a job file is one.
+    let one_line = "plane = [{ theta_r_deg = 60, readings = 6 }]";
+    let answer = service.ask("POST", "/api/v1/plan", TOML, one_line).await;
+    assert_eq!(answer.status, 200, "{answer:?}");
+    let latin1 = "# caf\u{e9}".chars().map(|c| c as u8).collect::<Vec<_>>();
+    let head = format!(
+        "POST /api/v1/plan HTTP/1.1\r\nHost: localhost\r\n{}{TOML}Content-Length: {}\r\n",
+        service.bearer("operate"),
+        latin1.len()
+    );
+    let answer = service.raw(&head, &latin1).await;
+    assert!(
+        answer.json()["detail"].as_str().unwrap().contains("Latin-1"),
+        "{answer:?}"
+    );
+    service.end().await;
+}

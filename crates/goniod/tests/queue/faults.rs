@@ -182,3 +182,42 @@ async fn a_clock_that_steps_back_changes_no_order() {
     assert!(next > last, "event ids go on: {last}, {next}");
     daemon.shutdown().await;
 }
+
+#[tokio::test]
+async fn a_store_that_was_deleted_emptied_or_replaced_beside_runs_is_noticed() {
+    let bench = Bench::new("");
+    let daemon = bench.open().await;
+    let mut events = daemon.events(None);
+    let job = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
+    state(&mut events, job.id, JobState::Done).await;
+    daemon.shutdown().await;
+    let store = bench.data().join("goniod.db");
+    let kept = std::fs::read(&store).unwrap();
+    let fresh = {
+        let other = Bench::new("");
+        other.open().await.shutdown().await;
+        std::fs::read(other.data().join("goniod.db")).unwrap()
+    };
+    for (how, bytes) in [
+        ("deleted", None),
+        ("emptied", Some(Vec::new())),
+        ("replaced", Some(fresh)),
+    ] {
+        std::fs::remove_file(&store).unwrap();
+        if let Some(bytes) = &bytes {
+            std::fs::write(&store, bytes).unwrap();
+        }
+        let refused = Daemon::open(bench.settings()).await.err().expect(how).to_string();
+        for said in ["goniod restore", "--accept-runs", "runs"] {
+            assert!(refused.contains(said), "{how}: {refused}");
+        }
+        let left = std::fs::read(&store).ok();
+        assert_eq!(
+            left.map(|left| left.is_empty()),
+            bytes.map(|bytes| bytes.is_empty()),
+            "{how}"
+        );
+        std::fs::write(&store, &kept).unwrap();
+    }
+    bench.open().await.shutdown().await;
+}

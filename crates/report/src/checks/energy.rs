@@ -40,8 +40,7 @@ pub(crate) fn energy(model: &dyn Model, scene: Option<&Scene>, azimuths: usize) 
         .collect();
     let verdict = match albedos.is_empty() {
         true => Verdict::Unknown,
-        // Written so that NaN is bad.
-        false if !(worst <= MOST[1]) || !black.is_empty() => Verdict::Bad,
+        false if worst.is_nan() || worst > MOST[1] || !black.is_empty() => Verdict::Bad,
         false if worst > MOST[0] => Verdict::Look,
         false => Verdict::Good,
     };

@@ -30,14 +30,18 @@ impl Laboratory {
 
     /// Puts a standard on the stage and takes what it says into the certificate.
     pub(crate) async fn calibrate(&mut self, standard: &Standard, specimen: Arc<dyn Brdf>) {
-        let visits = standard.visits(&self.file);
-        let records = self
-            .run(specimen, "", |mechanics| {
-                sweep::visits("calibration", &visits, mechanics)
-            })
-            .await;
+        let records = self.visit(standard, specimen).await;
         let certified = standard.certify(&self.file, &records, &self.certificate);
         self.certificate = certified.expect("a good standard");
+    }
+
+    /// The records of a calibration.
+    pub(crate) async fn visit(&self, standard: &Standard, specimen: Arc<dyn Brdf>) -> Vec<Record> {
+        let visits = standard.visits(&self.file);
+        self.run(specimen, "", |mechanics| {
+            sweep::visits("calibration", &visits, mechanics)
+        })
+        .await
     }
 
     /// Trap, mirror and white reference, in this order.

@@ -6,6 +6,8 @@ mod calibrated;
 mod coverage;
 mod flight;
 mod gap;
+mod light;
 mod photometer;
 mod range;
+mod standards;
 mod verdicts;

@@ -10,7 +10,11 @@ use crate::{Gain, RigFile};
 pub struct Certificate {
     /// Id, never reused.
     pub id: String,
-    /// When the last part was made, RFC 3339, UTC.
+    /// Its place in the order in which the certificates of a directory were made, from 1: the highest number is the
+    /// newest, whatever the clock said. 0: a program that did not number them made it.
+    #[serde(default)]
+    pub number: u64,
+    /// When the last part was made, RFC 3339, UTC. It tells the age, not the order.
     pub made: String,
     /// [`RigFile::fingerprint`] of the rig file for which it holds.
     pub rig: String,
@@ -25,6 +29,10 @@ pub struct Certificate {
     pub patches: Vec<Patch>,
     /// What they said, once there are enough of them.
     pub colour: Option<Colour>,
+    /// What is worth a look before its values are believed, in full sentences, found when it was chosen for a run; none
+    /// of it is stored with the certificate.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub remarks: Vec<String>,
 }
 
 /// How a part of a certificate was made.

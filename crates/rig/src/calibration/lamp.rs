@@ -34,6 +34,11 @@ impl Drift {
         Self { visits }
     }
 
+    /// Levels of the visits, in the order of their time.
+    pub(crate) fn levels(&self) -> impl Iterator<Item = f64> {
+        self.visits.iter().map(|visit| visit.1)
+    }
+
     /// Level at a time, s, and its standard uncertainty: that of the visits, and a quarter of the step between two of
     /// them as the half width of a rectangle, since nobody saw what was between.
     pub(crate) fn level(&self, time_s: f64) -> (f64, f64) {

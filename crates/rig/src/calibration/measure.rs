@@ -5,6 +5,7 @@ use glam::{DMat3, DVec3};
 
 use super::certificate::{Certificate, Colour, Conditions, Patch, Trap, White, Zero};
 use super::ladder::Ladder;
+use super::lamp::Lamp;
 use super::reduction::Reduction;
 use super::{Filling, Taken};
 use crate::{RigError, RigFile};
@@ -21,6 +22,17 @@ pub struct Certified {
     pub reflectance_factor: [f64; 3],
 }
 
+/// Readings of a white reference at one geometry, and what different geometries say of it, may differ by so many standard
+/// uncertainties and such a share beside: the lamp and the arms are not as steady as counting noise.
+const WHITE_SIGMAS: f64 = 8.0;
+const WHITE_SHARE: f64 = 0.01;
+/// The same share where nothing but visits to a reference pose follows the lamp.
+const WHITE_SHARE_VISITS: f64 = 0.05;
+/// Scans of a mirror's lobe at different angles may differ by so much in its centre: encoders of real servos are wrong by up
+/// to a quarter of a degree either way, and a mirror that moved is off by more.
+const MIRROR_DEG: f64 = 0.5;
+/// By so many of its standard uncertainties a black trap may give less than no light.
+const TRAP_SIGMAS: f64 = 8.0;
 /// A mirror's lobe must be seen over at least so many readings.
 const MIN_LOBE: usize = 5;
 /// Share of the peak below which a reading of a mirror's lobe does not count: the centre of a lobe must not hang on
@@ -58,9 +70,11 @@ impl White {
         };
         let straight = nominal.with_white(white.clone());
         let mut found: Vec<[f64; 3]> = Vec::new();
+        let mut geometries = Vec::new();
         let mut tilt: f64 = 0.0;
         let mut u_photometer = [0.0_f64; 3];
         for (at, taken) in certified {
+            let (first, mut u_counting) = (found.len(), 0.0_f64);
             for taken in taken {
                 let Ok(rate) = straight.rate(taken) else { continue };
                 let pose = before.aligned(taken.pose);
@@ -74,12 +88,18 @@ impl White {
                 for (c, u) in u_photometer.iter_mut().enumerate() {
                     let u_gain = rate.u_gain.iter().map(|step| step[c]).fold(0.0, f64::max);
                     *u = u.max(rate.u_linearity[c].hypot(u_gain));
+                    u_counting = u_counting.max((rate.u_counting[c] / rate.rgb[c]).abs());
                 }
                 found.push(std::array::from_fn(|c| {
                     let f = at.reflectance_factor[c] / std::f64::consts::PI;
                     (rate.rgb[c] - stray[c]) / (f * cosine)
                 }));
             }
+            geometries.push(Geometry {
+                pose: at.pose,
+                said: first..found.len(),
+                u_counting,
+            });
         }
         if found.is_empty() {
             return Err(RigError::Calibration {
@@ -87,17 +107,69 @@ impl White {
                 why: "no usable reading at a certified geometry".to_owned(),
             });
         }
+        let u_table = u_reference.hypot(tilt * before.u_zero(file).arm_rad());
+        agree(&geometries, &found, u_table, file)?;
         for c in 0..3 {
             let (mean, u) = mean(found.iter().map(|r| r[c]));
             white.responsivity[c] = mean;
-            white.u_responsivity[c] = (u / mean)
-                .hypot(u_reference)
-                .hypot(tilt * before.u_zero(file).arm_rad())
-                .hypot(u_photometer[c]);
+            white.u_responsivity[c] = (u / mean).hypot(u_table).hypot(u_photometer[c]);
         }
         white.conditions.temperature_c = temperature_c(readings);
         Ok(white)
     }
+}
+
+/// What the readings at one certified geometry say.
+struct Geometry {
+    pose: Pose,
+    /// Which of all responsivities.
+    said: std::ops::Range<usize>,
+    /// Largest relative standard uncertainty of its counts.
+    u_counting: f64,
+}
+
+/// Whether the readings at each geometry agree with each other, and the geometries among themselves within the uncertainty of
+/// their table.
+fn agree(geometries: &[Geometry], found: &[[f64; 3]], u_table: f64, file: &RigFile) -> Result<(), RigError> {
+    let share = match file.visits.lamp {
+        Lamp::Monitor => WHITE_SHARE,
+        Lamp::Visits => WHITE_SHARE_VISITS,
+    };
+    let refuse = |why: String| {
+        Err(RigError::Calibration {
+            what: "white reference",
+            why,
+        })
+    };
+    for c in 0..3 {
+        let all = mean(found.iter().map(|r| r[c])).0;
+        for geometry in geometries.iter().filter(|geometry| !geometry.said.is_empty()) {
+            let Pose { light, sensor } = geometry.pose;
+            let at = format!("at light {:.1}°, sensor {:.1}°", light.deg(), sensor.deg());
+            let said = || found[geometry.said.clone()].iter().map(|r| r[c]);
+            let (of_it, _) = mean(said());
+            let noise = WHITE_SIGMAS * geometry.u_counting + share;
+            let off = said().map(|r| (r / of_it - 1.0).abs()).fold(0.0, f64::max);
+            if off.is_nan() || off > noise {
+                return refuse(format!(
+                    "its readings {at} differ by {:.2} % from their mean, {:.2} % would be noise: look for light from outside, a \
+                     lamp that is not warm, or a reference that moved, and calibrate again",
+                    100.0 * off,
+                    100.0 * noise
+                ));
+            }
+            let (off, allowed) = ((of_it / all - 1.0).abs(), noise + WHITE_SIGMAS * u_table);
+            if off > allowed {
+                return refuse(format!(
+                    "what it says {at} differs by {:.2} % from the mean of all geometries, its table and the arms' zeros allow \
+                     {:.2} %: compare the table with the certificate, and measure a mirror first",
+                    100.0 * off,
+                    100.0 * allowed
+                ));
+            }
+        }
+    }
+    Ok(())
 }
 
 impl Trap {
@@ -119,6 +191,26 @@ impl Trap {
             for (sum, u) in variance.iter_mut().zip(rate.u_counting) {
                 *sum += u * u;
             }
+            for c in 0..3 {
+                let noise = TRAP_SIGMAS * rate.u_counting[c].hypot(rate.u_dark[c]);
+                if rate.rgb[c] < -noise {
+                    return Err(RigError::Calibration {
+                        what: "black trap",
+                        why: format!(
+                            "at light {:.1}°, sensor {:.1}° it gives {:.2e} counts per µs, less than no light by more than the \
+                             noise of {noise:.1e}: the dark level was not the one that was subtracted. Darken the room, and \
+                             calibrate again",
+                            taken.pose.light.deg(),
+                            taken.pose.sensor.deg(),
+                            rate.rgb[c]
+                        ),
+                    });
+                }
+            }
+            eprintln!(
+                "TRAP {:.0}s {:?} {:?} -> {:?}",
+                taken.time_s, taken.counts.exposure, taken.counts.rgb, rate.rgb
+            );
             points.push((before.aligned(taken.pose), rate.rgb));
         }
         if points.is_empty() {
@@ -180,6 +272,18 @@ impl Zero {
                 why: "no scan across its lobe".to_owned(),
             });
         }
+        let apart_deg = (sums.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+            - sums.iter().copied().fold(f64::INFINITY, f64::min))
+        .to_degrees();
+        if apart_deg > MIRROR_DEG {
+            return Err(RigError::Calibration {
+                what: "mirror",
+                why: format!(
+                    "its lobe stands at mirror directions that are {apart_deg:.2}° apart at different angles, up to \
+                     {MIRROR_DEG}° is possible: it moved, or light got in from outside; calibrate again"
+                ),
+            });
+        }
         let step = file.arms[0]
             .axis
             .resolution_rad()
@@ -223,18 +327,19 @@ impl Colour {
             });
         }
         let matrix = right * normal.inverse();
-        let left =
-            |patch: &Patch| (matrix * DVec3::from(patch.sensor) - DVec3::from(patch.rgb)).length_squared();
-        let squares: f64 = patches.iter().map(left).sum();
-        let white = patches.iter().flat_map(|patch| patch.rgb).fold(0.0, f64::max);
-        // Each row of the matrix is three numbers for as many equations as there are patches.
         let free = 3 * patches.len().saturating_sub(3);
-        Ok(Self {
+        let white = patches.iter().flat_map(|patch| patch.rgb).fold(0.0, f64::max);
+        let mut colour = Self {
             conditions: Conditions::default(),
             matrix: matrix.transpose().to_cols_array_2d(),
-            residual: (squares / (3 * patches.len()) as f64).sqrt() / white,
-            u: (free > 0).then(|| (squares / free as f64).sqrt() / white),
-        })
+            residual: 0.0,
+            // Each row of the matrix is three numbers for as many equations as there are patches.
+            u: None,
+        };
+        colour.residual = colour.left_over(patches).unwrap_or_default();
+        let squares = (colour.residual * white).powi(2) * (3 * patches.len()) as f64;
+        colour.u = (free > 0).then(|| (squares / free as f64).sqrt() / white);
+        Ok(colour)
     }
 }
 

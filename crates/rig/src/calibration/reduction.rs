@@ -73,7 +73,7 @@ impl<'a> Reduction<'a> {
             file,
             certificate,
             white,
-            darks: Darks::fit(readings),
+            darks: Darks::fit(readings, file.photometer.full_scale),
             drift: Drift::default(),
         };
         if file.visits.lamp == Lamp::Visits {
@@ -94,6 +94,12 @@ impl<'a> Reduction<'a> {
     pub(crate) fn with_white(mut self, white: White) -> Self {
         self.white = white;
         self
+    }
+
+    /// The lamp's output at the usable visits to the reference pose, relative to the first, in the order of their time.
+    /// None where a monitor follows the lamp.
+    pub fn lamp_levels(&self) -> Vec<f64> {
+        self.drift.levels().collect()
     }
 
     /// Where the arms really were, when their encoders said `pose`.

@@ -365,8 +365,9 @@ proptest! {
         };
         let darks = [take(100, 0.0), take(100_000, 0.0)].map(|dark| taken(pose, false, dark));
         let reading = take(time_us, 1.0);
-        let back = reflectance(&file(""), &darks, pose, reading).unwrap();
-        let dark = Darks::fit(&darks).counts(0.0, reading.exposure).unwrap().rgb;
+        let rig = file("");
+        let back = reflectance(&rig, &darks, pose, reading).unwrap();
+        let dark = Darks::fit(&darks, rig.photometer.full_scale).counts(0.0, reading.exposure).unwrap().rgb;
         for (c, back) in back.into_iter().enumerate() {
             // Half a count in the reading, one in the dark line, half a monitor count.
             let net = f64::from(reading.rgb[c]) - dark[c];

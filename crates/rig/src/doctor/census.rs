@@ -53,7 +53,10 @@ fn attempt(port: &Path, file: &RigFile, tell: &mut dyn FnMut(Finding)) -> Result
     if !missing.is_empty() {
         let elsewhere = elsewhere(port, file)?;
         for (device, id) in missing {
-            let remedy = remedy(device, id, baud, &strangers, &elsewhere);
+            // Alike servos with one id answer a ping with the same bytes at once, which is an undamaged answer.
+            let twin = present.iter().find(|(other, _)| *other != Device::Photometer);
+            let twin = twin.filter(|_| device != Device::Photometer).map(|&(_, id)| id);
+            let remedy = remedy(device, id, baud, &strangers, &elsewhere, (here.damaged, twin));
             let text = format!("{device} (id {id}) gives no reply at {baud} baud");
             tell(Finding::fail(CHECK, text, remedy));
         }
@@ -88,7 +91,14 @@ fn elsewhere(port: &Path, file: &RigFile) -> Result<Vec<(u32, Heard)>, RigError>
 }
 
 /// What to do about a device that does not answer, from who else does.
-fn remedy(device: Device, id: u8, baud: u32, strangers: &[Heard], elsewhere: &[(u32, Heard)]) -> String {
+fn remedy(
+    device: Device,
+    id: u8,
+    baud: u32,
+    strangers: &[Heard],
+    elsewhere: &[(u32, Heard)],
+    (damaged, twin): (usize, Option<u8>),
+) -> String {
     if let Some((at, _)) = elsewhere.iter().find(|(_, heard)| heard.id == id) {
         let code = BAUD_RATES.iter().find(|&&(_, rate)| rate == baud);
         let code = code.map_or(0, |&(code, _)| code);
@@ -109,7 +119,20 @@ fn remedy(device: Device, id: u8, baud: u32, strangers: &[Heard], elsewhere: &[(
             named(stranger)
         );
     }
-    "check its power and its cable; nobody answers under this id at any baud rate".to_owned()
+    if damaged > 0 {
+        return format!(
+            "answers were damaged, as those of two devices with one id are: unplug the others, see under which id the \
+             {device} answers alone, and write {id} to its address 7"
+        );
+    }
+    let nobody = "check its power and its cable; nobody answers under this id at any baud rate";
+    match twin {
+        Some(twin) => format!(
+            "{nobody}. Or both servos have the id {twin}: two devices with one id answer a ping as one, where they are alike. \
+             Unplug the other, see whether one still answers under {twin}, and write {id} to its address 7"
+        ),
+        None => nobody.to_owned(),
+    }
 }
 
 fn listed(devices: &[Heard]) -> String {
@@ -136,8 +159,15 @@ mod tests {
     #[test]
     fn the_remedy_follows_from_who_else_answers() {
         let to = |device, id, strangers: &[Heard], elsewhere: &[(u32, Heard)]| {
-            remedy(device, id, 1_000_000, strangers, elsewhere)
+            remedy(device, id, 1_000_000, strangers, elsewhere, (0, None))
         };
+        let told = remedy(Device::Sensor, 2, 1_000_000, &[], &[], (0, Some(1)));
+        assert!(told.contains("both servos have the id 1"), "{told}");
+        let told = remedy(Device::Sensor, 2, 1_000_000, &[], &[], (3, None));
+        assert!(
+            told.contains("two devices with one id") && told.contains("write 2 to its address 7"),
+            "{told}"
+        );
         let told = to(Device::Light, 1, &[], &[(57_600, SERVO)]);
         assert_eq!(
             told,

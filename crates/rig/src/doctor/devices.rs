@@ -3,7 +3,54 @@ use std::error::Error;
 use arms::Arm;
 
 use super::Finding;
-use crate::{Device, Drive, Rig};
+use crate::{Actuator, Detector, Device, Drive, Dynamixel, Rig};
+
+/// Whether a device answers what the other checks ask, whatever may be wrong with it.
+pub async fn answers<R: Rig>(drive: &mut Drive<R>, device: Device) -> bool {
+    // Three lost replies in a row are no chance.
+    for _ in 0..3 {
+        let rig = drive.rig();
+        let answered = match device {
+            Device::Light => rig.axis(Arm::Light).location().await.is_ok(),
+            Device::Sensor => rig.axis(Arm::Sensor).location().await.is_ok(),
+            Device::Photometer => rig.photometer().ticks().await.is_ok(),
+        };
+        if answered {
+            return true;
+        }
+    }
+    false
+}
+
+/// Whether all devices can be read in one transaction, as a run does; told only where they cannot, or not surely. The
+/// servos' indirect addresses are set for that, in their RAM. Moves nothing.
+pub async fn together(drive: &mut Drive<Dynamixel>) -> Option<Finding> {
+    const CHECK: &str = "bulk read";
+    const READS: usize = 20;
+    if let Err(error) = drive.rig().map_all().await {
+        return Some(Finding::error(CHECK, &error));
+    }
+    let (mut lost, mut last) = (0, None);
+    for n in 0..READS {
+        let read = match n % 2 {
+            0 => drive.rig().snapshot().await.map(drop),
+            _ => drive.rig().observe().await.map(drop),
+        };
+        if let Err(error) = read {
+            lost += 1;
+            last = Some(error);
+        }
+    }
+    let error = last?;
+    let text =
+        format!("{lost} of {READS} reads of all devices in one transaction failed, the last one: {error}");
+    let remedy = "each answers by itself, so it is their answers one after the other: make bus.latency_ms larger, set \
+                  every return delay (address 9) to 250 or less, and update the firmware of the device that is named";
+    Some(match lost == READS {
+        true => Finding::fail(CHECK, text, remedy),
+        false => Finding::warn(CHECK, text, remedy),
+    })
+}
 
 /// Whether one device is as the rig file says and healthy: model, firmware, return delay, modes, limits, alert bits.
 pub async fn device<R: Rig>(drive: &mut Drive<R>, device: Device) -> Finding {

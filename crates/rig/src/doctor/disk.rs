@@ -3,6 +3,8 @@ use std::path::Path;
 use rustix::fs::statvfs;
 
 use super::Finding;
+use super::suspend::held;
+use crate::Band;
 
 /// What a run takes, bytes: its MERL table alone has 35 MB.
 const RUN: u64 = 60_000_000;
@@ -23,8 +25,9 @@ pub fn room(directory: &Path) -> std::io::Result<u64> {
     Ok(system.f_bavail * system.f_frsize)
 }
 
-/// How much room there is for run directories below a directory, which may not exist yet.
-pub fn disk(directory: &Path) -> Finding {
+/// How much room there is for run directories below a directory, which may not exist yet, and whether that would hold a
+/// run by `suspend.disk_mb`, whose bounds in bytes are `hold`.
+pub fn disk(directory: &Path, hold: Option<Band>) -> Finding {
     let free = match room(directory) {
         Ok(free) => free,
         Err(error) => {
@@ -32,7 +35,13 @@ pub fn disk(directory: &Path) -> Finding {
             return Finding::fail("disk", text, "name a directory that can be read");
         }
     };
-    judged(directory, free)
+    let text = format!("{:.1} GB are free for {}", free as f64 / 1e9, directory.display());
+    let remedy = |band: Band| {
+        let needed_gb = band.release / 1e9;
+        format!("make room until {needed_gb:.1} GB are free, or lower suspend.disk_mb")
+    };
+    let held = held(hold, free as f64, &text, remedy);
+    held.unwrap_or_else(|| judged(directory, free))
 }
 
 fn judged(directory: &Path, free: u64) -> Finding {
@@ -63,10 +72,21 @@ mod tests {
     }
 
     #[test]
+    fn too_little_room_for_a_run_to_begin_fails() {
+        let bounds = Band {
+            hold: 1e18,
+            release: 2e18,
+        };
+        let finding = disk(Path::new("."), Some(bounds));
+        assert_eq!(finding.verdict, Verdict::Fail, "{finding:?}");
+        assert!(finding.remedy.unwrap().contains("suspend.disk_mb"));
+    }
+
+    #[test]
     fn a_directory_that_is_still_to_be_made_lies_somewhere() {
         let place = tempfile::tempdir().unwrap();
-        let finding = disk(&place.path().join("not/yet"));
+        let finding = disk(&place.path().join("not/yet"), None);
         assert!(finding.text.contains("GB free for"), "{finding:?}");
-        assert!(disk(Path::new("not/yet/here")).text.contains("GB free for"));
+        assert!(disk(Path::new("not/yet/here"), None).text.contains("GB free for"));
     }
 }

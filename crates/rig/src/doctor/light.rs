@@ -1,5 +1,6 @@
 use super::Finding;
-use crate::{Counts, Drive, DriveError, Exposure, Gain, PhotometerSettings, Rig};
+use super::suspend::held;
+use crate::{Counts, Drive, DriveError, Exposure, Gain, Lamp, PhotometerSettings, Rig};
 
 /// Longest integration that is tried, µs.
 const INTEGRATION_US: u32 = 10_000;
@@ -53,7 +54,17 @@ async fn attempt<R: Rig>(
     drive.wait(settings.lamp_warm_up).await?;
     let lit = drive.expose(exposure).await?;
     let output = (f64::from(lit.monitor) - f64::from(unlit.monitor)) / (monitor * f64::from(lit_us));
+    let followed = drive.file().visits.lamp == Lamp::Monitor;
+    let bounds = drive.file().suspend.lamp_rel.filter(|_| followed);
+    let text = format!(
+        "the lamp is {:.1} % off its nominal output",
+        100.0 * (output - 1.0).abs()
+    );
+    let held = held(bounds, (output - 1.0).abs(), &text, |_| {
+        "set calibration.monitor to what this lamp gives, or widen suspend.lamp_percent".to_owned()
+    });
     findings.push(lamp(output, lit.temperature_c));
+    findings.extend(held);
     Ok(())
 }
 

@@ -1,6 +1,6 @@
 use std::time::{Duration, Instant};
 
-use super::{Bin, Finding};
+use super::{Bin, Finding, Verdict};
 use crate::{Detector, Drive, Rig};
 
 /// Questions that are asked: enough for a 99th percentile, over in a second or two even at 16 ms each.
@@ -15,8 +15,9 @@ const LOST_MAX: f64 = 0.05;
 /// Bits on the wire of one question about the photometer's status and its reply.
 const WIRE_BITS: f64 = 330.0;
 
-/// How long the photometer takes to answer a question about its status, over and over; nothing is repeated.
-pub async fn round_trip<R: Rig>(drive: &mut Drive<R>) -> Finding {
+/// How long the photometer takes to answer a question about its status, over and over; nothing is repeated. `timer` is
+/// what was found about the adapter's latency timer, where somebody looked.
+pub async fn round_trip<R: Rig>(drive: &mut Drive<R>, timer: Option<Verdict>) -> Finding {
     let mut taken = Vec::with_capacity(QUESTIONS);
     for _ in 0..QUESTIONS {
         let asked = Instant::now();
@@ -26,10 +27,10 @@ pub async fn round_trip<R: Rig>(drive: &mut Drive<R>) -> Finding {
     }
     let bus = &drive.file().bus;
     let expected_ms = bus.latency.as_secs_f64() * 1e3 + WIRE_BITS / f64::from(bus.baud) * 1e3;
-    judged(&mut taken, expected_ms)
+    judged(&mut taken, expected_ms, timer)
 }
 
-fn judged(taken: &mut [Duration], expected_ms: f64) -> Finding {
+fn judged(taken: &mut [Duration], expected_ms: f64, timer: Option<Verdict>) -> Finding {
     const CHECK: &str = "round trip";
     let lost = QUESTIONS - taken.len();
     taken.sort_unstable();
@@ -50,8 +51,14 @@ fn judged(taken: &mut [Duration], expected_ms: f64) -> Finding {
     } else if lost > 0 {
         Finding::warn(CHECK, text, cabling)
     } else if median_ms > expected_ms {
+        let cause = match timer {
+            // There it is already as it should be, or the adapter has none.
+            Some(Verdict::Ok) => "look what else loads this computer or its USB hub",
+            _ => "set the adapter's latency timer to 1 ms",
+        };
         let remedy = format!(
-            "expected below {expected_ms:.2} ms: set the adapter's latency timer to 1 ms, or make bus.latency_ms true"
+            "expected below {expected_ms:.2} ms: {cause}, or set bus.latency_ms = {:.0}",
+            median_ms.ceil()
         );
         Finding::warn(CHECK, text, remedy)
     } else {
@@ -77,10 +84,21 @@ fn histogram(taken: &[Duration]) -> Vec<Bin> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::doctor::Verdict;
 
     fn judge(ms: f64, count: usize) -> Finding {
-        judged(&mut vec![Duration::from_secs_f64(ms / 1e3); count], 2.3)
+        judged(&mut vec![Duration::from_secs_f64(ms / 1e3); count], 2.3, None)
+    }
+
+    #[test]
+    fn the_latency_timer_is_not_blamed_where_it_is_right() {
+        let judge = |timer| judged(&mut vec![Duration::from_millis(16); QUESTIONS], 2.3, timer);
+        let remedy = judge(Some(Verdict::Ok)).remedy.unwrap();
+        assert!(
+            !remedy.contains("latency timer") && remedy.contains("bus.latency_ms = 16"),
+            "{remedy}"
+        );
+        let remedy = judge(Some(Verdict::Warn)).remedy.unwrap();
+        assert!(remedy.contains("latency timer"), "{remedy}");
     }
 
     #[test]

@@ -27,7 +27,9 @@ impl<R: Rig> Drive<R> {
     ) -> Result<T, DriveError<R::Error>> {
         let mut patience = Patience::new(self.file.bus.silence);
         loop {
-            match attempt(&mut self.rig).await {
+            let attempted = attempt(&mut self.rig).await;
+            self.beat();
+            match attempted {
                 Ok(value) => return Ok(value),
                 Err(error) => {
                     patience.spend(what, error).await?;

@@ -21,8 +21,9 @@ const RETURN_DELAY_MAX: Duration = Duration::from_micros(508);
 /// host they are 30 ms. On a busy one this program is woken late from each of them by as much as the kernel, an adapter's
 /// driver or the simulator are late with the reply, and so it waits for longer.
 const HOST_MARGIN: Duration = Duration::from_millis(30);
-const SLICE: Duration = Duration::from_millis(1);
-const SLICES: u32 = (HOST_MARGIN.as_millis() / SLICE.as_millis()) as u32;
+/// The port waits for whole milliseconds: two of a slice.
+const SLICE: Duration = Duration::from_millis(3);
+const SLICES: u32 = (HOST_MARGIN.as_millis() / 2) as u32;
 
 /// No reply comes later than this after its request. ROBOTIS' SDK gives up 34 ms after the last byte is due, and
 /// nobody reports replies that it missed; this is half as much again.

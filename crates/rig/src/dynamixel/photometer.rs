@@ -16,7 +16,10 @@ impl Detector for Photometer {
     type Error = RigError;
 
     async fn identify(&mut self) -> Result<Identity, RigError> {
-        let bits = self.node.hardware_error().await?;
+        let bits = match self.node.hardware_error().await {
+            Ok(bits) => bits,
+            Err(error) => return Err(self.node.explain(error).await),
+        };
         if bits != 0 {
             return Err(self.node.hardware(bits));
         }

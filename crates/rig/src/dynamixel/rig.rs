@@ -62,6 +62,18 @@ impl Dynamixel {
         })
     }
 
+    /// Points both servos' indirect data at their state, as a run does before it moves, so that from now on all devices
+    /// are read in one transaction. Moves nothing.
+    ///
+    /// # Errors
+    /// A servo that is silent or ill.
+    pub(crate) async fn map_all(&mut self) -> Result<(), RigError> {
+        for servo in &mut self.servos {
+            servo.map().await?;
+        }
+        Ok(())
+    }
+
     /// State of both servos, and a block of the photometer that begins with its status, in one transaction.
     async fn bulk(&mut self, photometer: Block) -> Result<(Snapshot, Vec<u8>), RigError> {
         let [light, sensor] = [&self.servos[0].node, &self.servos[1].node];

@@ -68,7 +68,7 @@ impl Servo {
 
     /// Points the indirect data at the state. A servo may refuse that while its torque is on; then the state is read
     /// register by register.
-    async fn map(&mut self) -> Result<(), RigError> {
+    pub(crate) async fn map(&mut self) -> Result<(), RigError> {
         let wanted = block::state_map();
         self.mapped = self.node.read(block::STATE_MAP).await? == wanted;
         if !self.mapped {
@@ -225,7 +225,10 @@ impl Actuator for Servo {
     type Error = RigError;
 
     async fn identify(&mut self) -> Result<Identity, RigError> {
-        let bits = self.node.hardware_error().await?;
+        let bits = match self.node.hardware_error().await {
+            Ok(bits) => bits,
+            Err(error) => return Err(self.node.explain(error).await),
+        };
         if bits != 0 {
             return Err(self.node.hardware(bits));
         }

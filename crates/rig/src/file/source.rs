@@ -2,7 +2,6 @@ use std::fmt::Display;
 use std::ops::{Range, RangeInclusive};
 use std::path::Path;
 
-use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -23,20 +22,20 @@ pub(super) struct Source<'a> {
 impl Source<'_> {
     /// Reads the text over the built-in one, key by key.
     pub(super) fn raw(&self, built_in: &str) -> Result<RawFile, RigError> {
-        let mut base = DeTable::parse(built_in).map_err(|error| self.form(&error, None))?;
+        let mut base = DeTable::parse(built_in).map_err(|error| self.syntax(&error))?;
         unplace(base.get_mut());
-        let own = DeTable::parse(self.text).map_err(|error| self.form(&error, None))?;
-        overlay(base.get_mut(), own.get_ref().clone());
-        RawFile::deserialize(toml::de::Deserializer::from(base))
-            .map_err(|error| self.form(&error, Some(own.get_ref())))
+        let own = DeTable::parse(self.text).map_err(|error| self.syntax(&error))?;
+        overlay(base.get_mut(), own.into_inner());
+        config::of_table(base).map_err(|flaws| RigError::Form {
+            place: self.place(flaws.first().span.as_ref()),
+            key: flaws.first().key.clone(),
+            why: flaws.why(self.text),
+        })
     }
 
     /// SHA-256 of what a calibration depends on, with the defaults filled in; see [`crate::RigFile::fingerprint`].
     pub(super) fn fingerprint(&self, built_in: &str) -> Result<String, RigError> {
-        let table = |text: &str| {
-            text.parse::<toml::Table>()
-                .map_err(|error| self.form(&error, None))
-        };
+        let table = |text: &str| text.parse::<toml::Table>().map_err(|error| self.syntax(&error));
         let mut all = table(built_in)?;
         merge(&mut all, table(self.text)?);
         all.retain(|key, _| ["light", "sensor", "photometer", "calibration"].contains(&key));
@@ -58,13 +57,10 @@ impl Source<'_> {
         Ok(hash.iter().map(|byte| format!("{byte:02x}")).collect())
     }
 
-    fn form(&self, error: &toml::de::Error, table: Option<&DeTable<'_>>) -> RigError {
-        let span = error.span().filter(|span| *span != BUILT_IN);
+    fn syntax(&self, error: &toml::de::Error) -> RigError {
         RigError::Form {
-            place: self.place(span.as_ref()),
-            key: table
-                .zip(span)
-                .and_then(|(table, span)| key_at(table, span.start)),
+            place: self.place(error.span().as_ref()),
+            key: None,
             why: error.message().to_owned(),
         }
     }
@@ -147,21 +143,6 @@ fn overlay<'a>(base: &mut DeTable<'a>, top: DeTable<'a>) {
             }
         }
     }
-}
-
-/// Dotted path of the key whose value covers an offset.
-fn key_at(table: &DeTable<'_>, offset: usize) -> Option<String> {
-    table.iter().find_map(|(key, value)| {
-        let inner = match value.get_ref() {
-            DeValue::Table(table) => key_at(table, offset),
-            _ => None,
-        };
-        match inner {
-            Some(inner) => Some(format!("{}.{inner}", key.get_ref())),
-            None if value.span().contains(&offset) => Some(key.get_ref().to_string()),
-            None => None,
-        }
-    })
 }
 
 /// Puts every key of `top` over those of `base`, table by table.

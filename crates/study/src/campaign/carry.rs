@@ -2,6 +2,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Duration;
 
 use capture::{Command, Header, MemoryJournal, Outcome, Record};
+use firmware_sim::{Disturbance, Fault};
+use report::Verdict;
 use rig::dynamixel::register::{Register, photometer, servo};
 use rig::{Device, Drive, Rig, RigFile};
 use sweep::Job;
@@ -96,9 +98,28 @@ async fn carry_out<B: Bench>(script: &Script) -> Result<Carried, String> {
         safe(&bench).map_err(|why| format!("after {outcome:?}: {why}"))?;
         match outcome {
             Outcome::Done => {
+                let lit = lit_from_outside(script);
+                let (verdict, checks) = match lit || script.seed.is_multiple_of(JUDGED) {
+                    true => report::judge(&journal.0).map_err(words)?,
+                    false => (Verdict::Good, Vec::new()),
+                };
+                let bad = verdict == Verdict::Bad;
+                if bad && !lit {
+                    let why = checks.into_iter().filter(|check| check.verdict == Verdict::Bad);
+                    let why: Vec<String> = why.map(|check| check.text).collect();
+                    return Err(format!(
+                        "called bad without light from outside: {}",
+                        why.join(" ")
+                    ));
+                }
+                let readings = match bad {
+                    true => 0,
+                    false => whole(&journal.0, steps, &job, &file, &*specimen)?,
+                };
                 return Ok(Carried {
                     executions: execution,
-                    readings: whole(&journal.0, steps, &job, &file, &*specimen)?,
+                    bad,
+                    readings,
                 });
             }
             Outcome::Stopped => return Err("stopped by nobody".to_owned()),
@@ -111,6 +132,16 @@ async fn carry_out<B: Bench>(script: &Script) -> Result<Carried, String> {
     Err(format!(
         "not complete after {MAX_EXECUTIONS} executions; last: {last}"
     ))
+}
+
+/// Of the captures without light from outside one in so many is judged: to make a model and look at all of it takes longer
+/// than to carry a capture out.
+const JUDGED: u64 = 16;
+
+/// Whether a script lets light in that is not the lamp's: the one fault after which a whole run may be of no use.
+fn lit_from_outside(script: &Script) -> bool {
+    let light = |fault: &Fault| matches!(fault.what, Disturbance::Glare(_) | Disturbance::RoomLight(_));
+    script.fault.iter().any(light)
 }
 
 /// The rig of a script. Its seed is half the script's, since TOML's numbers have 63 bits.

@@ -37,6 +37,7 @@ impl Bench for InProcess {
     }
 
     fn mend(&mut self, rig: Drive<InProcessRig>, _: &RigFile) -> Result<Drive<InProcessRig>, String> {
+        self.0.darken();
         for device in DEVICES {
             self.0.reboot(device);
         }

@@ -1,5 +1,5 @@
 use brdf::{Brdf, Spherical};
-use capture::Record;
+use capture::{Flag, Record};
 use glam::DVec3;
 use pdv::Observation;
 use report::{Measurement, MonteCarlo, observations};
@@ -28,7 +28,11 @@ pub(super) fn whole(
     specimen: &dyn Brdf,
 ) -> Result<u64, String> {
     let all = report::measurements(records, file);
-    let mut accepted = vec![0; steps];
+    let added = records.iter().map(|record| match record {
+        Record::Extension(extension) => extension.steps.len(),
+        _ => 0,
+    });
+    let mut accepted = vec![0; steps + added.sum::<usize>()];
     for m in all.iter().filter(|m| m.reading.accepted) {
         accepted[m.reading.step] += 1;
     }
@@ -43,6 +47,10 @@ pub(super) fn whole(
             m.pose.light.deg(),
             m.pose.sensor.deg()
         );
+        // A reading at full scale says that it tells nothing.
+        if m.reading.flags.contains(&Flag::Saturated) && m.rgb().is_none() {
+            continue;
+        }
         let (Some(f), Some(u)) = (m.rgb(), m.u) else {
             return Err(format!("{at}: no reflectance, {:?}", m.reflectance));
         };

@@ -65,6 +65,7 @@ impl Bench for OverWire {
         // Gives the port up.
         drop(rig);
         self.server.bench(|bench| {
+            bench.darken();
             for device in DEVICES {
                 bench.device(device).reboot();
             }

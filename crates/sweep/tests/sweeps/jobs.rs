@@ -134,27 +134,27 @@ fn bad_input_is_named_with_line_key_and_range() {
         ),
         (
             format!("{plane}speed = 3"),
-            "job.toml, line 4: speed: unknown field `speed`, expected one of `theta_r_deg`, `readings`, `distribution`",
+            "job.toml, line 4: plane[0].speed: unknown field `speed`, expected one of `theta_r_deg`, `readings`, `distribution`",
         ),
         (
             format!("{plane}distribution = \"dense\""),
-            "job.toml, line 4: distribution: unknown variant `dense`, expected one of `capped`, `paper`, `uniform`, `lobe`",
+            "job.toml, line 4: plane[0].distribution: unknown variant `dense`, expected one of `capped`, `paper`, `uniform`, `lobe`",
         ),
         (
             "[[plane]]\ntheta_r_deg = \"70\"\nreadings = 90".to_owned(),
-            "job.toml, line 2: theta_r_deg: invalid type: string \"70\", expected f64",
+            "job.toml, line 2: plane[0].theta_r_deg: invalid type: string \"70\", expected f64",
         ),
         (
             "[[plane]]\ntheta_r_deg = 70\nreadings = 9.5".to_owned(),
-            "job.toml, line 3: readings: invalid type: floating point `9.5`, expected i64",
+            "job.toml, line 3: plane[0].readings: invalid type: floating point `9.5`, expected i64",
         ),
         (
             "[[plane]]\ntheta_r_deg = 70".to_owned(),
-            "job.toml, line 1: [[plane]]: missing field `readings`",
+            "job.toml, line 1: plane[0]: missing field `readings`",
         ),
         (
             format!("{plane}[reconstruction]\nmodel = \"magic\""),
-            "job.toml, line 5: model: unknown variant `magic`, expected one of `separable`, `reciprocal`, `planes`, `bivariate`, `auto`",
+            "job.toml, line 5: reconstruction.model: unknown variant `magic`, expected one of `separable`, `reciprocal`, `planes`, `bivariate`, `auto`",
         ),
         (
             format!("{plane}[scene]\ntheta_i_deg = [60, 0]"),
@@ -170,7 +170,7 @@ fn bad_input_is_named_with_line_key_and_range() {
         ),
         (
             format!("{plane}[scene]\nchannels = [\"x\"]"),
-            "job.toml, line 5: channels: unknown variant `x`, expected one of `r`, `g`, `b`",
+            "job.toml, line 5: scene.channels[0]: unknown variant `x`, expected one of `r`, `g`, `b`",
         ),
     ];
     for (text, expected) in table {

@@ -102,7 +102,7 @@ proptest! {
         let plan = possible(&Job { mode: Mode::Fly, ..job }, &mechanics)?;
         let margin_rad = mechanics.margin_rad + mechanics.tolerance_rad;
         for flight in plan.steps.chunk_by(|a, b| a.pass == b.pass).filter(|of| of[0].pass.is_some() && of[0].lamp) {
-            let poses: Vec<Pose> = flight.iter().map(|step| step.pose()).collect();
+            let poses: Vec<Pose> = flight.iter().map(sweep::Step::pose).collect();
             let (first, last) = (poses[0], poses[poses.len() - 1]);
             let way = |arm: Arm| (last.angle(arm) - first.angle(arm)).abs();
             let lead = if way(Arm::Light) >= way(Arm::Sensor) { Arm::Light } else { Arm::Sensor };

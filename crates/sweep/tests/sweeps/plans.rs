@@ -328,7 +328,7 @@ fn seconds_are_those_of_profiles_settling_and_integration() {
         }
     }
     let sum: f64 = plan.steps.iter().map(|step| step.seconds).sum();
-    assert!((plan.seconds() - sum - mechanics.warm_up_s).abs() < 1e-9);
+    assert!((plan.seconds() - sum - mechanics.warm_up_s - plan.closing_s).abs() < 1e-9);
 }
 
 #[test]

@@ -153,3 +153,143 @@ async fn what_is_no_database_is_not_opened() {
         Err(StoreError::Open { .. })
     ));
 }
+
+/// A closed store with a run of so many records more.
+async fn kept(path: &std::path::Path, records: u64) -> Vec<Record> {
+    let store = Sqlite::open(path).await.unwrap();
+    let run = with_run(&store).await;
+    for seq in 1..=records {
+        store
+            .append(&run.id, seq, &end(&format!("record {seq}")))
+            .await
+            .unwrap();
+    }
+    let records = store.records(&run.id).await.unwrap();
+    store.close().await;
+    records
+}
+
+#[tokio::test]
+async fn forty_flipped_bits_are_told_when_the_store_is_opened() {
+    use rand::{RngExt, SeedableRng};
+    let folder = TempDir::new().unwrap();
+    let sound = folder.path().join("sound.db");
+    kept(&sound, 200).await;
+    let bytes = std::fs::read(&sound).unwrap();
+    let first: u64 = rand::rng().random_range(0..1 << 32);
+    for seed in first..first + 20 {
+        let mut random = rand::rngs::StdRng::seed_from_u64(seed);
+        let mut flipped = bytes.clone();
+        for _ in 0..40 {
+            let at = random.random_range(0..flipped.len());
+            flipped[at] ^= 1 << random.random_range(0..8);
+        }
+        let path = folder.path().join(format!("{seed}.db"));
+        std::fs::write(&path, flipped).unwrap();
+        let error = Sqlite::open(&path)
+            .await
+            .expect_err(&format!("seed {seed}"))
+            .to_string();
+        assert!(
+            error.contains(&seed.to_string()),
+            "seed {seed}: it names the file: {error}"
+        );
+    }
+}
+
+#[tokio::test]
+async fn a_torn_or_foreign_file_is_damaged_and_left_as_it_is() {
+    let folder = TempDir::new().unwrap();
+    let sound = folder.path().join("sound.db");
+    kept(&sound, 200).await;
+    let bytes = std::fs::read(&sound).unwrap();
+    let mut hole = bytes.clone();
+    let middle = hole.len() / 2 / 4096 * 4096;
+    hole[middle..middle + 4096].fill(0);
+    for (name, bytes) in [
+        ("torn", bytes[..bytes.len() / 2].to_vec()),
+        ("hole", hole),
+        (
+            "text",
+            b"this is no database, and longer than the head of one would be, to be sure of it".repeat(20),
+        ),
+    ] {
+        let path = folder.path().join(name);
+        std::fs::write(&path, &bytes).unwrap();
+        let error = Sqlite::open(&path).await.expect_err(name);
+        assert!(matches!(error, StoreError::Corrupt { .. }), "{name}: {error:?}");
+        assert!(error.to_string().contains("goniod restore"), "{error}");
+        assert_eq!(std::fs::read(&path).unwrap(), bytes, "{name}");
+    }
+}
+
+#[tokio::test]
+async fn a_record_that_is_no_record_any_more_is_told_when_the_store_is_opened() {
+    let folder = TempDir::new().unwrap();
+    let path = folder.path().join("goniod.db");
+    kept(&path, 3).await;
+    let options = SqliteConnectOptions::new().filename(&path);
+    let pool = SqlitePool::connect_with(options).await.unwrap();
+    sqlx::query("UPDATE records SET body = replace(body, '{', '[') WHERE seq = 2")
+        .execute(&pool)
+        .await
+        .unwrap();
+    pool.close().await;
+    let error = Sqlite::open(&path).await.unwrap_err().to_string();
+    assert!(
+        error.contains("1 records cannot be read, the first of run 01"),
+        "{error}"
+    );
+}
+
+#[tokio::test]
+async fn a_backup_holds_what_is_still_in_the_log_and_is_restored() {
+    let folder = TempDir::new().unwrap();
+    let (path, copy) = (folder.path().join("goniod.db"), folder.path().join("copy.db"));
+    let store = Sqlite::open(&path).await.unwrap();
+    let run = with_run(&store).await;
+    store.append(&run.id, 1, &end("in the log")).await.unwrap();
+    let before = store.records(&run.id).await.unwrap();
+    // As a daemon has it: open, with a write-ahead log.
+    backup(&path, &copy).await.unwrap();
+    assert!(matches!(
+        backup(&path, &copy).await,
+        Err(StoreError::Exists { .. })
+    ));
+    store.append(&run.id, 2, &end("after the backup")).await.unwrap();
+    store.close().await;
+
+    let aside = restore(&copy, &path, "now")
+        .await
+        .unwrap()
+        .expect("there was a store");
+    let restored = Sqlite::open(&path).await.unwrap();
+    assert_eq!(restored.records(&run.id).await.unwrap(), before);
+    restored.close().await;
+    let older = Sqlite::open(&aside).await.unwrap();
+    assert_eq!(
+        older.records(&run.id).await.unwrap().len(),
+        before.len() + 1,
+        "nothing is thrown away"
+    );
+    older.close().await;
+}
+
+#[tokio::test]
+async fn a_damaged_store_makes_no_backup_and_a_damaged_backup_replaces_nothing() {
+    let folder = TempDir::new().unwrap();
+    let (path, bad) = (folder.path().join("goniod.db"), folder.path().join("bad.db"));
+    kept(&path, 200).await;
+    let sound = std::fs::read(&path).unwrap();
+    std::fs::write(&bad, &sound[..sound.len() / 2]).unwrap();
+    let to = folder.path().join("copy.db");
+    assert!(matches!(backup(&bad, &to).await, Err(StoreError::Corrupt { .. })));
+    assert!(!to.exists());
+    assert!(backup(&folder.path().join("none.db"), &to).await.is_err());
+    assert!(!folder.path().join("none.db").exists(), "none is made");
+    assert!(matches!(
+        restore(&bad, &path, "now").await,
+        Err(StoreError::Corrupt { .. })
+    ));
+    assert_eq!(std::fs::read(&path).unwrap(), sound);
+}
