@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// What each crate stands on; it may also name what those stand on.
-const EDGES: [(&str, &[&str]); 16] = [
+const EDGES: [(&str, &[&str]); 17] = [
     ("arms", &[]),
     ("brdf", &[]),
+    ("formats", &["brdf"]),
     ("terminal", &[]),
     ("config", &[]),
     ("pdv", &["brdf"]),
