@@ -17,7 +17,8 @@ const FLOOR: f64 = 1e-3;
 
 /// A BRDF tabulated over every combination of three lists of angles, linear between them and held beyond them.
 pub(crate) struct Lattice {
-    coordinates: Coordinates,
+    /// The angles of incident and exitant direction.
+    of: fn(DVec3, DVec3) -> [f64; 3],
     /// Ascending, rad.
     axes: [Vec<f64>; 3],
     /// The last axis fastest, sr⁻¹.
@@ -37,10 +38,16 @@ impl Lattice {
         });
         let values = nodes.collect();
         Self {
-            coordinates,
+            of: coordinates.of,
             axes,
             values,
         }
+    }
+
+    /// A table from its values, the last axis fastest; `of` gives the place of incident and exitant direction.
+    pub(crate) fn new(of: fn(DVec3, DVec3) -> [f64; 3], axes: [Vec<f64>; 3], values: Vec<DVec3>) -> Self {
+        debug_assert_eq!(values.len(), axes.iter().map(Vec::len).product::<usize>());
+        Self { of, axes, values }
     }
 
     /// A table from nodes in any order, over all combinations of the angles that occur; a node that occurs more than once
@@ -105,7 +112,7 @@ impl Lattice {
             }
         }
         Ok(Self {
-            coordinates,
+            of: coordinates.of,
             axes,
             values,
         })
@@ -154,7 +161,7 @@ impl Brdf for Lattice {
         if !(incident.z > 0.0 && exitant.z > 0.0) {
             return DVec3::ZERO;
         }
-        self.at((self.coordinates.of)(incident, exitant))
+        self.at((self.of)(incident, exitant))
     }
 }
 

@@ -25,6 +25,7 @@ mod coordinates;
 mod csv_long;
 mod error;
 mod export;
+mod exr_slice;
 mod fidelity;
 mod format;
 mod lattice;
@@ -42,7 +43,7 @@ pub use fidelity::{Fidelity, albedo};
 pub use format::{Exported, Format, Reader, Tolerance, read, recognise};
 
 /// Every format, in the order in which files are recognised. A new one is a file of this crate and a line here.
-pub static FORMATS: [Format; 8] = [
+pub static FORMATS: [Format; 10] = [
     merl::FORMAT,
     csv_long::FORMAT,
     rgl::RGB,
@@ -51,4 +52,6 @@ pub static FORMATS: [Format; 8] = [
     zemax::FORMAT,
     ssdd::FORMAT,
     pab_opto::FORMAT,
+    exr_slice::PDV,
+    exr_slice::HALF_DIFFERENCE,
 ];
