@@ -64,13 +64,11 @@ pub(crate) const ANGLES: Coordinates = Coordinates {
     },
 };
 
-/// θ_h, θ_d and φ_d of half and difference vector: φ_d in 0 … π/2, as reciprocity and the mirror symmetry of an isotropic
-/// specimen allow.
+/// θ_h, θ_d and φ_d of half and difference vector: φ_d in 0 … π, as the mirror symmetry of an isotropic specimen allows.
 pub(crate) const HALF_DIFFERENCE: Coordinates = Coordinates {
     of: |incident, exitant| {
         let angles = HalfDifference::from_directions(incident, exitant);
-        let phi = folded(angles.phi_d);
-        [angles.theta_h, angles.theta_d, phi.min(PI - phi)]
+        [angles.theta_h, angles.theta_d, folded(angles.phi_d)]
     },
     directions: |[theta_h, theta_d, phi_d]| {
         HalfDifference {
@@ -80,14 +78,49 @@ pub(crate) const HALF_DIFFERENCE: Coordinates = Coordinates {
         }
         .directions()
     },
-    range: [[0.0, FRAC_PI_2], [0.0, FRAC_PI_2], [0.0, FRAC_PI_2]],
+    range: [[0.0, FRAC_PI_2], [0.0, FRAC_PI_2], [0.0, PI]],
     across: Some(0),
     near_mirror: |axis, angle, [a, b]| match axis {
-        0 => [angle, a * FRAC_PI_2, b * FRAC_PI_2],
-        1 => [LOBE_RAD * a * a * a, angle, b * FRAC_PI_2],
+        0 => [angle, a * FRAC_PI_2, b * PI],
+        1 => [LOBE_RAD * a * a * a, angle, b * PI],
         _ => [LOBE_RAD * a * a * a, b * FRAC_PI_2, angle],
     },
 };
+
+/// The same of a specimen that may be lit and viewed the other way round: φ_d in 0 … π/2.
+pub(crate) const RECIPROCAL: Coordinates = Coordinates {
+    of: |incident, exitant| {
+        let [theta_h, theta_d, phi_d] = (HALF_DIFFERENCE.of)(incident, exitant);
+        [theta_h, theta_d, phi_d.min(PI - phi_d)]
+    },
+    range: [[0.0, FRAC_PI_2], [0.0, FRAC_PI_2], [0.0, FRAC_PI_2]],
+    near_mirror: |axis, angle, [a, b]| {
+        (HALF_DIFFERENCE.near_mirror)(axis, angle, [a, if axis == 2 { b } else { 0.5 * b }])
+    },
+    ..HALF_DIFFERENCE
+};
+
+/// Whether a BRDF may be lit and viewed the other way round, as far as some thousand pairs of directions tell.
+pub(crate) fn is_reciprocal(brdf: &dyn Brdf) -> bool {
+    let angles = |n: u32| f64::from(n) * 7.9_f64.to_radians() + 0.01;
+    (0..11).all(|i| {
+        (0..i).all(|r| {
+            (0..13).all(|turn| {
+                let incident = Spherical {
+                    theta: angles(i),
+                    phi: f64::from(turn) * PI / 12.0,
+                };
+                let exitant = Spherical {
+                    theta: angles(r),
+                    phi: 0.0,
+                };
+                let (incident, exitant) = (incident.direction(), exitant.direction());
+                let (there, back) = (brdf.eval(incident, exitant), brdf.eval(exitant, incident));
+                (there - back).abs().max_element() <= 1e-4 * there.max_element().max(1e-3)
+            })
+        })
+    })
+}
 
 /// θ of the mirror direction, azimuth and distance of the exitant direction from it: azimuth 0 towards the normal, π away
 /// from it, the other half of the circle being the same.
@@ -163,7 +196,7 @@ mod tests {
         ) {
             let i = Spherical { theta: theta.0, phi: phi.0 }.direction();
             let r = Spherical { theta: theta.1, phi: phi.1 }.direction();
-            for way in [ANGLES, HALF_DIFFERENCE, MIRROR] {
+            for way in [ANGLES, HALF_DIFFERENCE, RECIPROCAL, MIRROR] {
                 let angles = (way.of)(i, r);
                 for (angle, [low, high]) in angles.iter().zip(way.range) {
                     prop_assert!((low..=high).contains(angle), "{angles:?}");

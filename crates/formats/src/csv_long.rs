@@ -1,12 +1,12 @@
 use std::collections::BTreeMap;
-use std::f64::consts::PI;
+use std::f64::consts::{FRAC_PI_2, PI};
 
 use brdf::Brdf;
 use csv::{ReaderBuilder, WriterBuilder};
 use glam::DVec3;
 
-use crate::coordinates::{ANGLES, HALF_DIFFERENCE, folded};
-use crate::lattice::{Lattice, even, fitted, half_difference_start};
+use crate::coordinates::{ANGLES, HALF_DIFFERENCE, RECIPROCAL, folded};
+use crate::lattice::{self, Lattice, even, fitted};
 use crate::text::{angle_deg, number, reflectance, written};
 use crate::{Error, Export, Fidelity, Format, Place, Tolerance};
 
@@ -96,13 +96,7 @@ fn model(brdf: &dyn Brdf) -> Vec<([f64; 3], DVec3)> {
     {
         return plain.nodes().collect();
     }
-    let table = fitted(
-        HALF_DIFFERENCE,
-        half_difference_start(),
-        brdf,
-        &FORMAT.tolerance,
-        NODES,
-    );
+    let (table, _) = lattice::half_difference(brdf, &FORMAT.tolerance, NODES);
     let above = table.nodes().filter_map(|(angles, f)| {
         let (incident, exitant) = (HALF_DIFFERENCE.directions)(angles);
         // Where half vector and normal are the same, or the directions are, φ_d has no meaning.
@@ -183,11 +177,9 @@ fn half_difference(nodes: &[([f64; 3], DVec3)]) -> Option<Lattice> {
         ([theta_h, theta_d, if known { phi_d } else { 0.0 }], f)
     };
     let nodes: Vec<_> = nodes.iter().map(pair).collect();
-    Lattice::from_nodes(
-        HALF_DIFFERENCE,
-        ["theta_h", "theta_d", "phi_d"],
-        &nodes,
-        Some([2, 1, 0]),
-    )
-    .ok()
+    // Where there is no φ_d beyond 90°, the others are the same by reciprocity.
+    let reciprocal = nodes.iter().all(|([_, _, phi_d], _)| *phi_d < FRAC_PI_2 + 1e-3);
+    let coordinates = if reciprocal { RECIPROCAL } else { HALF_DIFFERENCE };
+    let names = ["theta_h", "theta_d", "phi_d"];
+    Lattice::from_nodes(coordinates, names, &nodes, Some([2, 1, 0])).ok()
 }

@@ -4,7 +4,7 @@ use brdf::Brdf;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::coordinates::{Coordinates, lifted};
+use crate::coordinates::{Coordinates, HALF_DIFFERENCE, RECIPROCAL, is_reciprocal, lifted};
 use crate::{Error, Fidelity, Place, Tolerance};
 
 /// Two nodes of one axis that are nearer than this, rad, are one.
@@ -353,11 +353,15 @@ impl<'a> Refinement<'a> {
     }
 }
 
-/// Where a table over half and difference angles begins: half angles as dense near 0 as MERL's, so that a lobe is found at
-/// all.
-pub(crate) fn half_difference_start() -> [Vec<f64>; 3] {
+/// A table over half and difference angles with nodes where a BRDF needs them, and whether it is folded by reciprocity.
+pub(crate) fn half_difference(brdf: &dyn Brdf, tolerance: &Tolerance, most: usize) -> (Lattice, bool) {
+    let reciprocal = is_reciprocal(brdf);
+    let coordinates = if reciprocal { RECIPROCAL } else { HALF_DIFFERENCE };
+    let [_, _, [_, turn]] = coordinates.range;
+    // Half angles as dense near 0 as MERL's, so that a lobe is found at all.
     let half = (0..=16).map(|n| (f64::from(n) / 16.0).powi(2) * FRAC_PI_2);
-    [half.collect(), even(0.0, FRAC_PI_2, 9), even(0.0, FRAC_PI_2, 3)]
+    let start = [half.collect(), even(0.0, FRAC_PI_2, 9), even(0.0, turn, 4)];
+    (fitted(coordinates, start, brdf, tolerance, most), reciprocal)
 }
 
 /// `n` + 1 angles from `low` to `high` in even steps.

@@ -28,9 +28,12 @@ mod export;
 mod exr_slice;
 mod fidelity;
 mod format;
+mod gltf;
 mod lattice;
+mod materialx;
 mod merl;
 mod pab_opto;
+mod principled;
 mod rgl;
 mod ssdd;
 mod tar;
@@ -43,7 +46,7 @@ pub use fidelity::{Fidelity, albedo};
 pub use format::{Exported, Format, Reader, Tolerance, read, recognise};
 
 /// Every format, in the order in which files are recognised. A new one is a file of this crate and a line here.
-pub static FORMATS: [Format; 10] = [
+pub static FORMATS: [Format; 12] = [
     merl::FORMAT,
     csv_long::FORMAT,
     rgl::RGB,
@@ -54,4 +57,6 @@ pub static FORMATS: [Format; 10] = [
     pab_opto::FORMAT,
     exr_slice::PDV,
     exr_slice::HALF_DIFFERENCE,
+    materialx::FORMAT,
+    gltf::FORMAT,
 ];

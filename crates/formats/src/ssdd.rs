@@ -5,8 +5,8 @@ use brdf::Brdf;
 use glam::DVec3;
 
 use crate::colour::{channels_of_spectrum, rgb_of_xyz};
-use crate::coordinates::{ANGLES, Coordinates, HALF_DIFFERENCE};
-use crate::lattice::{Lattice, fitted, half_difference_start};
+use crate::coordinates::{ANGLES, Coordinates, HALF_DIFFERENCE, RECIPROCAL};
+use crate::lattice::{Lattice, half_difference};
 use crate::text::{LARGEST, angle_deg, lines, numbers, reflectance, shortened, text, written_rgb};
 use crate::{Error, Export, Format, Place, Tolerance};
 
@@ -33,13 +33,7 @@ fn contains(bytes: &[u8], part: &[u8]) -> bool {
 }
 
 fn write(export: &Export<'_>) -> Result<Vec<u8>, Error> {
-    let table = fitted(
-        HALF_DIFFERENCE,
-        half_difference_start(),
-        export.brdf,
-        &FORMAT.tolerance,
-        NODES,
-    );
+    let (table, reciprocal) = half_difference(export.brdf, &FORMAT.tolerance, NODES);
     let list = |angles: &[f64]| {
         let words: Vec<String> = angles
             .iter()
@@ -53,9 +47,14 @@ fn write(export: &Export<'_>) -> Result<Vec<u8>, Error> {
         let _ = writeln!(out, "# {name}: {value}");
     }
     out.push_str(
-        "\nDATA_TYPE brdf\nCOLOR_MODEL rgb\nPARAM_TYPE half_difference_coordinate_system\n\
-         REDUCTION_TYPE bilateral_symmetry reciprocity\n",
+        "
+DATA_TYPE brdf
+COLOR_MODEL rgb
+PARAM_TYPE half_difference_coordinate_system
+",
     );
+    let reduction = if reciprocal { " reciprocity" } else { "" };
+    let _ = writeln!(out, "REDUCTION_TYPE bilateral_symmetry{reduction}");
     for (n, axis) in [(0, h), (2, d), (3, phi)] {
         let _ = writeln!(out, "PARAM{n}_LIST {}", list(axis));
     }
@@ -99,7 +98,10 @@ fn read(bytes: &[u8]) -> Result<Box<dyn Brdf>, Error> {
         "half_difference_coordinate_system, spherical_coordinate_system",
     )?;
     let coordinates = match kind {
-        "half_difference_coordinate_system" => HALF_DIFFERENCE,
+        "half_difference_coordinate_system" => match meta.get("REDUCTION_TYPE") {
+            Some((_, reduction)) if reduction.contains("reciprocity") => RECIPROCAL,
+            _ => HALF_DIFFERENCE,
+        },
         _ => ANGLES,
     };
     let list = |key: &'static str, high: f64| {
