@@ -15,6 +15,9 @@ const THETA_MAX_RAD: f64 = 80.0 * PI / 180.0;
 const FLOOR: f64 = 1e-3;
 /// Zenith angles at which the directional albedo is compared, degrees.
 const ALBEDO_AT_DEG: [f64; 3] = [0.0, 45.0, 75.0];
+/// How far from the mirror direction it is looked at, rad: 0.25°, an aperture's half-angle. In the mirror direction itself half and
+/// difference angles have no φ_d, and a measured table may have several values.
+const PEAK_RAD: f64 = 0.25 * PI / 180.0;
 /// Zenith angles whose mirror directions are compared, degrees.
 const PEAKS_AT_DEG: [f64; 5] = [3.0, 20.0, 45.0, 60.0, 75.0];
 
@@ -44,7 +47,7 @@ pub struct Fidelity {
     pub p95: f64,
     /// Directional albedo at 0°, 45° and 75°, luminance: of the BRDF and of the file.
     pub albedo: [(f64, f64); 3],
-    /// Reflectance in the mirror direction where it differs most, luminance in sr⁻¹: of the BRDF and of the file.
+    /// Reflectance 0.25° about the mirror direction where it differs most, luminance in sr⁻¹: of the BRDF and of the file.
     pub peak: (f64, f64),
 }
 
@@ -73,16 +76,7 @@ impl Fidelity {
                 .get(at.min(count - 1))
                 .map_or(0.0, |&[_, relative]| relative)
         };
-        let peaks = PEAKS_AT_DEG.map(|theta_deg| {
-            let theta = theta_deg.to_radians();
-            let exitant = Spherical { theta, phi: 0.0 }.direction();
-            let incident = Spherical { theta, phi: PI }.direction();
-            let of = |brdf: &dyn Brdf| luminance(brdf.eval(incident, exitant));
-            match source.valid(incident, exitant) && file.valid(incident, exitant) {
-                true => (of(source), of(file)),
-                false => (0.0, 0.0),
-            }
-        });
+        let peaks = PEAKS_AT_DEG.map(|theta_deg| mirror_direction(source, file, theta_deg.to_radians()));
         let worst = |a: &&(f64, f64), b: &&(f64, f64)| relative(**a).total_cmp(&relative(**b));
         Self {
             pairs: errors.len() / 3,
@@ -130,6 +124,28 @@ impl fmt::Display for Fidelity {
             self.peak.1,
             self.peak.0
         )
+    }
+}
+
+/// Mean luminance of a BRDF and of a file on a ring about the mirror direction, of the directions that are valid in both.
+fn mirror_direction(source: &dyn Brdf, file: &dyn Brdf, theta: f64) -> (f64, f64) {
+    let (sin, cos) = theta.sin_cos();
+    let incident = DVec3::new(-sin, 0.0, cos);
+    let (mirror, up) = (DVec3::new(sin, 0.0, cos), DVec3::new(-cos, 0.0, sin));
+    let (mut sums, mut count) = ((0.0, 0.0), 0.0);
+    for n in 0..8 {
+        let around = DVec2::from_angle((f64::from(n) + 0.5) * TAU / 8.0) * PEAK_RAD.sin();
+        let exitant = mirror * PEAK_RAD.cos() + up * around.x + DVec3::Y * around.y;
+        if source.valid(incident, exitant) && file.valid(incident, exitant) {
+            sums.0 += luminance(source.eval(incident, exitant));
+            sums.1 += luminance(file.eval(incident, exitant));
+            count += 1.0;
+        }
+    }
+    if count > 0.0 {
+        (sums.0 / count, sums.1 / count)
+    } else {
+        (0.0, 0.0)
     }
 }
 

@@ -64,6 +64,20 @@ impl Tolerance {
 
     /// The first figure that is too large with its value and the largest one allowed; `None` where all are within.
     pub fn exceeded(&self, fidelity: &Fidelity) -> Option<(&'static str, f64, f64)> {
+        // Not a number is too large as well.
+        self.figures(fidelity)
+            .into_iter()
+            .find(|(_, found, allowed)| found.is_nan() || found > allowed)
+    }
+
+    /// The largest figure as a share of what is allowed: at most 1 where all are within.
+    pub(crate) fn share(&self, fidelity: &Fidelity) -> f64 {
+        let shares = self.figures(fidelity).map(|(_, found, allowed)| found / allowed);
+        shares.into_iter().fold(0.0, f64::max)
+    }
+
+    /// Every figure with its value and the largest one allowed.
+    fn figures(&self, fidelity: &Fidelity) -> [(&'static str, f64, f64); 5] {
         [
             ("MALE", fidelity.male, self.male),
             ("the median relative error", fidelity.median, self.median),
@@ -79,9 +93,6 @@ impl Tolerance {
                 self.peak,
             ),
         ]
-        .into_iter()
-        // Not a number is too large as well.
-        .find(|(_, found, allowed)| found.is_nan() || found > allowed)
     }
 }
 

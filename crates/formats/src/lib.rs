@@ -60,3 +60,8 @@ pub static FORMATS: [Format; 12] = [
     materialx::FORMAT,
     gltf::FORMAT,
 ];
+
+/// The page for people, whose example is compiled and run.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/formats.md")]
+struct Page;

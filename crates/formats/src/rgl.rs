@@ -1,6 +1,7 @@
 //! Tensor files of RGL: what Mitsuba calls `measured`, what pbrt-v4 and powitacq read.
 
 mod bake;
+mod loss;
 mod measured;
 mod tensor;
 mod warp;

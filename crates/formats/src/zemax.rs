@@ -27,7 +27,7 @@ pub(crate) const FORMAT: Format = Format {
 };
 
 /// Most nodes.
-const NODES: usize = 150_000;
+const NODES: usize = 250_000;
 /// Keyword of each block of numbers.
 const BLOCKS: [&str; 3] = ["TristimulusX", "TristimulusY", "TristimulusZ"];
 

@@ -1,16 +1,17 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use brdf::{Brdf, HalfDifference, Spherical};
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::TOLERANCE;
+use super::loss::loss;
 use super::measured::{Measured, Plane, normal, u_of_theta};
 use super::tensor::{Field, Kind, Tensor};
 use super::warp::Warp;
 use crate::colour::luminance;
-use crate::coordinates::{lift, lifted};
-use crate::{Error, Export, Fidelity, Tolerance};
+use crate::coordinates::lifted;
+use crate::{Error, Export, Fidelity};
 
 /// Which numbers a file holds.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -31,7 +32,16 @@ const SIGMA: usize = 256;
 const LAST_RAD: f64 = 89.9 * PI / 180.0;
 /// What is tried, one after the other: sides of the square of s, and how much of what is allowed may be lost between angles
 /// of incidence.
-const STEPS: [(usize, f64); 6] = [(32, 0.5), (48, 0.5), (48, 0.2), (64, 0.2), (64, 0.1), (96, 0.1)];
+const STEPS: [(usize, f64); 8] = [
+    (32, 0.5),
+    (48, 0.5),
+    (48, 0.2),
+    (64, 0.2),
+    (64, 0.1),
+    (64, 0.03),
+    (80, 0.03),
+    (96, 0.03),
+];
 /// Angles of incidence to begin with.
 const FIRST_SLICES: usize = 9;
 /// Shares of even density beside the one that follows f cos θ, and powers of that one, which are tried.
@@ -56,7 +66,7 @@ pub(crate) fn bake(export: &Export<'_>, channels: Channels) -> Result<Vec<u8>, E
         if TOLERANCE.exceeded(&fidelity).is_none() {
             return Ok(bytes);
         }
-        let error = (fidelity.male / TOLERANCE.male).max(fidelity.albedo_error() / TOLERANCE.albedo);
+        let error = TOLERANCE.share(&fidelity);
         if best.as_ref().is_none_or(|(least, _)| error < *least) {
             best = Some((error, bytes));
         }
@@ -286,60 +296,8 @@ impl Slice {
 
     /// What is lost at this slice's own angle of incidence.
     fn error(&self, brdf: &dyn Brdf, facets: &Facets) -> f64 {
-        loss(brdf, &Self::measured(&[self], facets), self.theta_i, &TOLERANCE)
+        loss(brdf, &Self::measured(&[self], facets), self.theta_i)
     }
-}
-
-/// What a file loses for light at one zenith angle, as a share of what is allowed: of the MALE over exitant directions
-/// below 80°, and of the reflected light about the mirror direction.
-fn loss(brdf: &dyn Brdf, file: &dyn Brdf, theta_i: f64, allowed: &Tolerance) -> f64 {
-    const DIRECTIONS: u32 = 768;
-    let incident = lift(
-        Spherical {
-            theta: theta_i,
-            phi: 0.0,
-        }
-        .direction(),
-    );
-    let places = |n: u32| {
-        [0.754_877_666_246_692_8, 0.569_840_290_998_053_3].map(|step| (0.5 + step * f64::from(n)).fract())
-    };
-    let male: f64 = (0..DIRECTIONS)
-        .map(|n| {
-            let [a, b] = places(n);
-            let exitant = Spherical {
-                theta: a * 80.0_f64.to_radians(),
-                phi: b * PI,
-            }
-            .direction();
-            let (f, g) = (brdf.eval(incident, exitant), file.eval(incident, exitant));
-            let ratio = (DVec3::ONE + g * incident.z) / (DVec3::ONE + f * incident.z);
-            ratio.to_array().map(|ratio| ratio.ln().abs()).iter().sum::<f64>() / 3.0
-        })
-        .sum();
-    let (mut light, mut lost) = (0.0, 0.0);
-    for n in 0..DIRECTIONS {
-        // On the disk onto which directions project, dense about the mirror direction; as rings of albedo are.
-        let [a, b] = places(n);
-        let distance = 2.0 * a.powi(4);
-        let mirror = DVec2::new(-incident.x, -incident.y);
-        let place = mirror + DVec2::from_angle(b * PI) * distance;
-        let z_squared = 1.0 - place.length_squared();
-        if z_squared > 0.0 {
-            let exitant = place.extend(z_squared.sqrt());
-            let area = distance * a.powi(3);
-            let (f, g) = (
-                luminance(brdf.eval(incident, exitant)),
-                luminance(file.eval(incident, exitant)),
-            );
-            light += f * area;
-            lost += (g - f).abs() * area;
-        }
-    }
-    // Pairs beyond 80° are not judged by MALE.
-    let judged = if theta_i < 80.0_f64.to_radians() { 1.0 } else { 0.0 };
-    let light = lost / light.max(f64::MIN_POSITIVE) / (2.0 * allowed.albedo);
-    judged * male / f64::from(DIRECTIONS) / allowed.male + light
 }
 
 /// Slices at the angles of incidence that the specimen needs: the interval in which interpolation loses most is halved
@@ -353,7 +311,7 @@ fn slices(brdf: &dyn Brdf, facets: &Facets, shape: Shape, target: f64) -> Vec<Sl
     let mut slices: Vec<Slice> = angles.into_par_iter().map(slice).collect();
     let between = |low: &Slice, high: &Slice| {
         let middle = f64::midpoint(low.theta_i, high.theta_i);
-        let excess = loss(brdf, &Slice::measured(&[low, high], facets), middle, &TOLERANCE)
+        let excess = loss(brdf, &Slice::measured(&[low, high], facets), middle)
             - 0.5 * (low.error(brdf, facets) + high.error(brdf, facets));
         excess.max(0.0) * (high.theta_i - low.theta_i) / LAST_RAD
     };
