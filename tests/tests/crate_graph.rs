@@ -21,7 +21,7 @@ const EDGES: [(&str, &[&str]); 17] = [
     ("session", &["report", "firmware-sim"]),
     ("api", &[]),
     ("goniod", &["session", "api"]),
-    ("gonioctl", &["session", "api", "study"]),
+    ("gonioctl", &["session", "api", "study", "formats"]),
     ("tests", &["gonioctl", "goniod"]),
 ];
 
@@ -43,7 +43,7 @@ const NOT_IN_THE_COMMAND_LINE: [&str; 10] = [
 ];
 
 /// No I/O but files behind explicit functions: nothing of these may appear in their manifests or sources.
-const PURE: [&str; 5] = ["arms", "brdf", "config", "pdv", "sweep"];
+const PURE: [&str; 6] = ["arms", "brdf", "config", "formats", "pdv", "sweep"];
 const NOT_IN_A_PURE_MANIFEST: [&str; 4] = ["tokio", "rustix", "serialport", "tracing-subscriber"];
 const NOT_IN_A_PURE_SOURCE: [&str; 5] = [
     "std::env",

@@ -2,8 +2,12 @@ use std::path::PathBuf;
 
 use api::client::Refused;
 use api::{Client, ClientError, JobId};
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
+use formats::FORMATS;
+
+use crate::export;
 
 /// Measures how a flat specimen reflects light, with two servo arms and a photometer.
 ///
@@ -189,16 +193,30 @@ pub(crate) enum Command {
         #[command(flatten)]
         output: Output,
     },
-    /// Write the result of a run in one format to a file, or to stdout.
+    /// Write the result of a run in one format to a file, or to stdout; the file is read back before it is done.
+    ///
+    /// It does not matter whether the run wrote that format: the model is rebuilt from the readings.
     Export {
         /// The run directory.
-        run: PathBuf,
-        /// What to write.
-        #[arg(long)]
-        format: Format,
+        run: Option<PathBuf>,
+        /// What to write: a format, "csv" for the readings, or "list" to list all formats with what they keep.
+        #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(export::words()))]
+        format: String,
         /// Where to; stdout unless given.
         #[arg(long, value_name = "FILE")]
         to: Option<PathBuf>,
+    },
+    /// Write a BRDF file of any format in another one; the file is read back before it is done.
+    Convert {
+        /// The file, or a fitted MERL material, "lambert:ALBEDO" or "mirror:REFLECTANCE".
+        #[arg(value_name = "IN")]
+        from: String,
+        /// The new file.
+        #[arg(value_name = "OUT")]
+        to: PathBuf,
+        /// Its format; the one that its extension belongs to unless given.
+        #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(FORMATS.iter().map(|format| format.name)))]
+        format: Option<String>,
     },
     /// Compare two BRDFs: every error metric.
     Eval {
@@ -351,17 +369,6 @@ pub(crate) struct Output {
     /// Print JSON for machines.
     #[arg(long, global = true)]
     pub(crate) json: bool,
-}
-
-/// What `export` writes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Format {
-    /// The reconstruction as a MERL table, brdf.binary.
-    Merl,
-    /// The slice over θ_r and d_p, slice.exr.
-    Exr,
-    /// The readings, readings.csv.
-    Csv,
 }
 
 #[cfg(test)]

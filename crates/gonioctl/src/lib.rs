@@ -8,6 +8,7 @@ mod campaign;
 mod cli;
 mod closing;
 mod conform;
+mod convert;
 mod doctor;
 mod errand;
 mod error;
@@ -21,6 +22,7 @@ mod plan;
 mod ports;
 mod progress;
 mod queue;
+mod rebuilt;
 mod reconstruct;
 mod run;
 mod screen;
@@ -132,7 +134,8 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             );
         }
         Command::Park { daemon, output } => return send(OperatorCommand::Park, &daemon, output),
-        Command::Export { run, format, to } => export::export(&run, format, to.as_deref())?,
+        Command::Export { run, format, to } => export::export(run.as_deref(), &format, to.as_deref())?,
+        Command::Convert { from, to, format } => convert::convert(&from, &to, format.as_deref())?,
         Command::Eval {
             truth,
             estimate,
