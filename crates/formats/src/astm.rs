@@ -5,7 +5,8 @@ use glam::DVec3;
 
 use crate::colour::{channels_of_spectrum, rgb_of_xyz};
 use crate::coordinates::{ANGLES, folded};
-use crate::lattice::{Lattice, even, fitted};
+use crate::lattice::Lattice;
+use crate::refinement::{even, fitted};
 use crate::text::{angle_deg, lines, number, numbers, reflectance, shortened, text, written_rgb};
 use crate::{Error, Export, Format, Place, Tolerance};
 

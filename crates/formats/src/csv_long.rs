@@ -6,7 +6,8 @@ use csv::{ReaderBuilder, WriterBuilder};
 use glam::DVec3;
 
 use crate::coordinates::{ANGLES, HALF_DIFFERENCE, RECIPROCAL, folded};
-use crate::lattice::{self, Lattice, even, fitted};
+use crate::lattice::Lattice;
+use crate::refinement::{self, even, fitted};
 use crate::text::{angle_deg, number, reflectance, written};
 use crate::{Error, Export, Fidelity, Format, Place, Tolerance};
 
@@ -96,7 +97,7 @@ fn model(brdf: &dyn Brdf) -> Vec<([f64; 3], DVec3)> {
     {
         return plain.nodes().collect();
     }
-    let (table, _) = lattice::half_difference(brdf, &FORMAT.tolerance, NODES);
+    let (table, _) = refinement::half_difference(brdf, &FORMAT.tolerance, NODES);
     let above = table.nodes().filter_map(|(angles, f)| {
         let (incident, exitant) = (HALF_DIFFERENCE.directions)(angles);
         // Where half vector and normal are the same, or the directions are, φ_d has no meaning.

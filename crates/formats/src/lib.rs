@@ -34,6 +34,7 @@ mod materialx;
 mod merl;
 mod pab_opto;
 mod principled;
+mod refinement;
 mod rgl;
 mod ssdd;
 mod tar;

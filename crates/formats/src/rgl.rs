@@ -1,8 +1,10 @@
 //! Tensor files of RGL: what Mitsuba calls `measured`, what pbrt-v4 and powitacq read.
 
 mod bake;
+mod facets;
 mod loss;
 mod measured;
+mod slice;
 mod tensor;
 mod warp;
 

@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use crate::colour::{channels_of_spectrum, rgb_of_xyz};
 use crate::coordinates::{ANGLES, Coordinates, HALF_DIFFERENCE, RECIPROCAL};
-use crate::lattice::{Lattice, half_difference};
+use crate::lattice::Lattice;
+use crate::refinement::half_difference;
 use crate::text::{LARGEST, angle_deg, lines, numbers, reflectance, shortened, text, written_rgb};
 use crate::{Error, Export, Format, Place, Tolerance};
 

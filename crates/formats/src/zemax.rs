@@ -6,7 +6,8 @@ use glam::DVec3;
 
 use crate::colour::{rgb_of_xyz, xyz_of_rgb};
 use crate::coordinates::MIRROR;
-use crate::lattice::{Lattice, even, fitted};
+use crate::lattice::Lattice;
+use crate::refinement::{even, fitted};
 use crate::text::{angle_deg, lines, number, reflectance, shortened, text, written};
 use crate::{Error, Export, Format, Place, Tolerance, albedo};
 

@@ -1,3 +1,5 @@
+use std::borrow::Cow;
+
 use crate::{Error, Place};
 
 /// The first twelve bytes of a tensor file.
@@ -55,7 +57,30 @@ pub(crate) struct Field<'a> {
     pub(crate) name: &'a [u8],
     pub(crate) kind: Kind,
     pub(crate) shape: Vec<usize>,
-    pub(crate) data: &'a [u8],
+    pub(crate) data: Cow<'a, [u8]>,
+}
+
+impl Field<'static> {
+    /// A field of 32-bit floating-point numbers.
+    pub(crate) fn floats(name: &'static str, shape: &[usize], values: impl IntoIterator<Item = f64>) -> Self {
+        let bytes = values.into_iter().flat_map(|value| (value as f32).to_le_bytes());
+        Self {
+            name: name.as_bytes(),
+            kind: Kind::F32,
+            shape: shape.to_vec(),
+            data: bytes.collect(),
+        }
+    }
+
+    /// A field of bytes.
+    pub(crate) fn bytes(name: &'static str, bytes: Vec<u8>) -> Self {
+        Self {
+            name: name.as_bytes(),
+            kind: Kind::U8,
+            shape: vec![bytes.len()],
+            data: bytes.into(),
+        }
+    }
 }
 
 /// A tensor file: named arrays, in the order of the file.
@@ -86,7 +111,7 @@ impl<'a> Tensor<'a> {
         }
         for field in &self.0 {
             bytes.resize(bytes.len().next_multiple_of(8), 0);
-            bytes.extend(field.data);
+            bytes.extend(field.data.iter());
         }
         bytes
     }
@@ -163,7 +188,7 @@ impl<'a> Tensor<'a> {
                 name,
                 kind: Kind::of(code),
                 shape,
-                data,
+                data: data.into(),
             });
         }
         Ok(Self(fields))
