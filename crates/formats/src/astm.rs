@@ -112,79 +112,97 @@ impl Columns {
 
 fn read(bytes: &[u8]) -> Result<Box<dyn Brdf>, Error> {
     let mut lines = lines(text(bytes)?);
-    let mut points = None;
-    let (columns, width) = loop {
-        let Some((line, text)) = lines.next() else {
-            let allowed = "a line VARS with the names of the columns";
-            return Err(Error::malformed(
-                Place::Field("VARS".into()),
-                "no such line",
-                allowed,
-            ));
-        };
-        let (key, value) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
-        match key {
-            "NUM_POINTS" => points = Some((line, number(value, line)?)),
-            "VARS" => {
-                let names: Vec<&str> = value.split(',').map(str::trim).collect();
-                let Some((angles, rest)) = names
-                    .split_at_checked(4)
-                    .filter(|(angles, _)| *angles == ANGLE_NAMES)
-                else {
-                    let found = format!("columns {}", shortened(value));
-                    let allowed = format!("{} and then those of the BRDF", ANGLE_NAMES.join(","));
-                    return Err(Error::malformed(Place::Line(line), found, allowed));
-                };
-                break (Columns::named(rest, line)?, angles.len() + rest.len());
-            }
-            _ => {}
-        }
-    };
+    let Head {
+        points,
+        columns,
+        width,
+    } = Head::read(&mut lines)?;
     let mut nodes = Vec::new();
     let mut azimuth = None;
     for (line, text) in lines.filter(|(_, text)| !text.is_empty()) {
+        let refuse =
+            |found: String, allowed: String| Err(Error::malformed(Place::Line(line), found, allowed));
         let row = numbers(text.split(','), line)?;
-        let &[theta_i, phi_i, theta_s, phi_s, ref values @ ..] = row.as_slice() else {
-            return Err(Error::malformed(
-                Place::Line(line),
-                "fewer than four numbers",
-                format!("{width} numbers"),
-            ));
-        };
         if row.len() != width {
-            let found = format!("{} numbers", row.len());
-            return Err(Error::malformed(
-                Place::Line(line),
-                found,
+            return refuse(
+                format!("{} numbers", row.len()),
                 format!("{width} numbers, as VARS says"),
-            ));
+            );
         }
-        if (phi_i - *azimuth.get_or_insert(phi_i)).abs() > 1e-6 {
-            let found = format!("φ_i of {phi_i} rad where the rows before have another");
-            return Err(Error::malformed(
-                Place::Line(line),
-                found,
-                "one φ_i: an isotropic specimen",
-            ));
+        let (angles, values) = row.split_at(ANGLE_NAMES.len());
+        if (angles[1] - *azimuth.get_or_insert(angles[1])).abs() > 1e-6 {
+            let found = format!("φ_i of {} rad where the rows before have another", angles[1]);
+            return refuse(found, "one φ_i: an isotropic specimen".to_owned());
         }
-        let zenith = |angle: f64, what| angle_deg(angle.to_degrees(), [0.0, 90.0], what, line);
         let values: Vec<f64> = values
             .iter()
             .map(|&value| reflectance(value, line))
             .collect::<Result<_, _>>()?;
-        let turn = angle_deg((phi_s - phi_i).to_degrees(), [-720.0, 720.0], "φ_s − φ_i", line)?;
-        let angles = [zenith(theta_i, "θ_i")?, zenith(theta_s, "θ_s")?, folded(turn)];
-        nodes.push((angles, columns.rgb(&values)));
+        nodes.push((relative(angles, line)?, columns.rgb(&values)));
     }
     if let Some((line, points)) = points.filter(|(_, points)| *points != nodes.len() as f64) {
-        let found = format!("NUM_POINTS {points}");
         let allowed = format!("the number of rows, which is {}", nodes.len());
-        return Err(Error::malformed(Place::Line(line), found, allowed));
+        return Err(Error::malformed(
+            Place::Line(line),
+            format!("NUM_POINTS {points}"),
+            allowed,
+        ));
     }
-    Ok(Box::new(Lattice::from_nodes(
-        ANGLES,
-        ["theta_i", "theta_s", "phi_s"],
-        &nodes,
-        None,
-    )?))
+    let names = ["theta_i", "theta_s", "phi_s"];
+    Ok(Box::new(Lattice::from_nodes(ANGLES, names, &nodes, None)?))
+}
+
+/// θ_i, θ_s and the azimuth between them, of the four angles of a row in rad.
+fn relative(angles: &[f64], line: u64) -> Result<[f64; 3], Error> {
+    let zenith = |angle: f64, what| angle_deg(angle.to_degrees(), [0.0, 90.0], what, line);
+    let turn = angle_deg(
+        (angles[3] - angles[1]).to_degrees(),
+        [-720.0, 720.0],
+        "φ_s − φ_i",
+        line,
+    )?;
+    Ok([zenith(angles[0], "θ_i")?, zenith(angles[2], "θ_s")?, folded(turn)])
+}
+
+/// What the header says of the rows.
+struct Head {
+    /// How many there are, with the line that says so.
+    points: Option<(u64, f64)>,
+    columns: Columns,
+    /// Numbers of a row.
+    width: usize,
+}
+
+impl Head {
+    /// Reads up to the line VARS, which is the last one of the header.
+    fn read<'a>(lines: &mut impl Iterator<Item = (u64, &'a str)>) -> Result<Self, Error> {
+        let mut points = None;
+        for (line, text) in lines {
+            let (key, value) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+            if key == "NUM_POINTS" {
+                points = Some((line, number(value, line)?));
+            }
+            if key != "VARS" {
+                continue;
+            }
+            let names: Vec<&str> = value.split(',').map(str::trim).collect();
+            let split = names.split_at_checked(ANGLE_NAMES.len());
+            let Some((_, rest)) = split.filter(|(angles, _)| *angles == ANGLE_NAMES) else {
+                let found = format!("columns {}", shortened(value));
+                let allowed = format!("{} and then those of the BRDF", ANGLE_NAMES.join(","));
+                return Err(Error::malformed(Place::Line(line), found, allowed));
+            };
+            return Ok(Self {
+                points,
+                columns: Columns::named(rest, line)?,
+                width: names.len(),
+            });
+        }
+        let allowed = "a line VARS with the names of the columns";
+        Err(Error::malformed(
+            Place::Field("VARS".into()),
+            "no such line",
+            allowed,
+        ))
+    }
 }

@@ -6,7 +6,7 @@ use crate::{Error, Export, FORMATS, Fidelity};
 
 /// A file format for BRDFs.
 pub struct Format {
-    /// Its name on the command line.
+    /// The name by which the command line knows it.
     pub name: &'static str,
     /// The usual extension of its files, without the dot.
     pub extension: &'static str,
@@ -14,11 +14,11 @@ pub struct Format {
     pub about: &'static str,
     /// How well a file must give back what was written into it.
     pub tolerance: Tolerance,
-    /// The bytes of a file.
+    /// Makes the bytes of a file.
     pub write: fn(&Export<'_>) -> Result<Vec<u8>, Error>,
-    /// Whether bytes look like a file of this format, by what they begin with.
+    /// Tells whether bytes look like a file of this format, by what they begin with.
     pub recognises: fn(&[u8]) -> bool,
-    /// The BRDF that a file holds.
+    /// Makes a BRDF of the bytes of a file.
     pub read: Reader,
 }
 
@@ -62,7 +62,7 @@ impl Tolerance {
         peak: 0.05,
     };
 
-    /// The first figure that is too large with its value and the largest one allowed; `None` where all are within.
+    /// Returns the first figure that is too large, with its value and the largest one allowed; `None` where all are within.
     pub fn exceeded(&self, fidelity: &Fidelity) -> Option<(&'static str, f64, f64)> {
         // Not a number is too large as well.
         self.figures(fidelity)
@@ -106,7 +106,7 @@ pub struct Exported {
 }
 
 impl Format {
-    /// The format of that name.
+    /// Finds the format of a name.
     ///
     /// # Errors
     /// There is none; the error lists all names.
@@ -209,7 +209,7 @@ pub fn read(path: &Path) -> Result<(&'static Format, Box<dyn Brdf>), Error> {
     }
 }
 
-/// The format of which bytes look like a file.
+/// Finds the format of which bytes look like a file; `None` where there is none.
 pub fn recognise(bytes: &[u8]) -> Option<&'static Format> {
     FORMATS.iter().find(|format| (format.recognises)(bytes))
 }

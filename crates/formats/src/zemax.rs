@@ -5,7 +5,7 @@ use brdf::Brdf;
 use glam::DVec3;
 
 use crate::colour::{rgb_of_xyz, xyz_of_rgb};
-use crate::coordinates::MIRROR;
+use crate::coordinates::{MIRROR, folded};
 use crate::lattice::Lattice;
 use crate::refinement::{even, fitted};
 use crate::text::{angle_deg, lines, number, reflectance, shortened, text, written};
@@ -29,6 +29,8 @@ pub(crate) const FORMAT: Format = Format {
 
 /// Most nodes.
 const NODES: usize = 250_000;
+/// Keywords of the lists of angles.
+const LISTS: [&str; 3] = ["AngleOfIncidence", "ScatterAzimuth", "ScatterRadial"];
 /// Keyword of each block of numbers.
 const BLOCKS: [&str; 3] = ["TristimulusX", "TristimulusY", "TristimulusZ"];
 
@@ -46,8 +48,7 @@ fn write(export: &Export<'_>) -> Result<Vec<u8>, Error> {
         let _ = writeln!(out, "# {name}: {value}");
     }
     out.push_str("Source Measured\nSymmetry PlaneSymmetrical\nSpectralContent XYZ\nScatterType BRDF\nSampleRotation 1\n0\n");
-    let names = ["AngleOfIncidence", "ScatterAzimuth", "ScatterRadial"];
-    for (name, axis) in names.iter().zip(table.axes()) {
+    for (name, axis) in LISTS.iter().zip(table.axes()) {
         let words: Vec<String> = axis
             .iter()
             .map(|angle| format!("{:.6}", angle.to_degrees()))
@@ -133,6 +134,18 @@ impl<'a> Words<'a> {
         (0..count as usize).map(|_| self.number()).collect()
     }
 
+    /// A list of ascending angles in degrees from 0, in rad.
+    fn angles(&mut self, what: &str, high_deg: f64) -> Result<Vec<f64>, Error> {
+        let degrees = self.list()?;
+        if !degrees.is_sorted_by(|a, b| a < b) {
+            return Err(self.refuse(&format!("{what} out of order"), "ascending angles"));
+        }
+        degrees
+            .into_iter()
+            .map(|degrees| angle_deg(degrees, [0.0, high_deg], what, self.line))
+            .collect()
+    }
+
     fn refuse(&self, found: &str, allowed: &str) -> Error {
         Error::malformed(
             Place::Line(self.line),
@@ -144,14 +157,27 @@ impl<'a> Words<'a> {
 
 fn read(bytes: &[u8]) -> Result<Box<dyn Brdf>, Error> {
     let mut words = Words::new(bytes)?;
+    let ([incidence, azimuth, radial], xyz) = head(&mut words)?;
+    let colours = colours(&mut words, incidence.len(), azimuth.len() * radial.len(), xyz)?;
+    let angles = incidence.iter().flat_map(|&a| {
+        let radial = &radial;
+        let about = azimuth.iter().map(|&b| folded(b));
+        about.flat_map(move |b| radial.iter().map(move |&c| [a, b, c]))
+    });
+    let nodes: Vec<([f64; 3], DVec3)> = angles.zip(colours).collect();
+    Ok(Box::new(Lattice::from_nodes(MIRROR, LISTS, &nodes, None)?))
+}
+
+/// Reads up to the keyword of the first block: the three lists of angles in rad, and whether the blocks are CIE XYZ.
+fn head(words: &mut Words<'_>) -> Result<([Vec<f64>; 3], bool), Error> {
     let mut axes: [Option<Vec<f64>>; 3] = Default::default();
-    let mut turns = 360.0;
+    let mut turn_deg = 360.0;
     let xyz = loop {
         let key = words.next("Monochrome or TristimulusX")?;
         match key {
             "Source" => _ = words.one_of(&["Measured", "Generated", "Simulated"])?,
             "Symmetry" => {
-                turns = match words.one_of(&["PlaneSymmetrical", "ASymmetrical"])? {
+                turn_deg = match words.one_of(&["PlaneSymmetrical", "ASymmetrical"])? {
                     "PlaneSymmetrical" => 180.0,
                     _ => 360.0,
                 }
@@ -163,67 +189,56 @@ fn read(bytes: &[u8]) -> Result<Box<dyn Brdf>, Error> {
                     return Err(words.refuse("several rotations", "one rotation: an isotropic specimen"));
                 }
             }
-            "AngleOfIncidence" | "ScatterAzimuth" | "ScatterRadial" => {
-                let (axis, high) = match key {
-                    "AngleOfIncidence" => (0, 90.0),
-                    "ScatterAzimuth" => (1, turns),
-                    _ => (2, 180.0),
-                };
-                let degrees = words.list()?;
-                if !degrees.is_sorted_by(|a, b| a < b) {
-                    return Err(words.refuse(&format!("{key} out of order"), "ascending angles"));
-                }
-                let rad = degrees
-                    .into_iter()
-                    .map(|degrees| angle_deg(degrees, [0.0, high], key, words.line));
-                axes[axis] = Some(rad.collect::<Result<_, _>>()?);
-            }
             "Monochrome" => break false,
             "TristimulusX" => break true,
-            _ => return Err(words.refuse(key, "a keyword of the format")),
+            _ => {
+                let Some(axis) = LISTS.iter().position(|list| *list == key) else {
+                    return Err(words.refuse(key, "a keyword of the format"));
+                };
+                axes[axis] = Some(words.angles(key, [90.0, turn_deg, 180.0][axis])?);
+            }
         }
     };
-    let [Some(incidence), Some(azimuth), Some(radial)] = axes else {
-        let place = Place::Line(words.line);
-        return Err(Error::malformed(
-            place,
-            "a list of angles is missing",
-            "AngleOfIncidence, ScatterAzimuth, ScatterRadial",
-        ));
-    };
-    let blocks: &[&str] = if xyz { &BLOCKS } else { &["Monochrome"] };
+    match axes {
+        [Some(incidence), Some(azimuth), Some(radial)] => Ok(([incidence, azimuth, radial], xyz)),
+        _ => {
+            let place = Place::Line(words.line);
+            Err(Error::malformed(
+                place,
+                "a list of angles is missing",
+                LISTS.join(", "),
+            ))
+        }
+    }
+}
+
+/// Reads the blocks behind the first one's keyword: linear RGB in the order of the file.
+fn colours(words: &mut Words<'_>, incidence: usize, about: usize, xyz: bool) -> Result<Vec<DVec3>, Error> {
+    let blocks: &[&'static str] = if xyz { &BLOCKS } else { &["Monochrome"] };
     let mut colours: Vec<DVec3> = Vec::new();
     for (channel, block) in blocks.iter().enumerate() {
-        if channel > 0 && words.next(block)? != *block {
-            return Err(words.refuse("another block", block));
+        if channel > 0 {
+            words.one_of(&[block])?;
         }
         words.one_of(&["DataBegin"])?;
-        let mut at = 0;
-        for _ in 0..incidence.len() {
+        for a in 0..incidence {
             words.one_of(&["TIS"])?;
             words.number()?;
-            for _ in 0..azimuth.len() * radial.len() {
+            for b in 0..about {
                 let number = words.number()?;
                 let value = reflectance(number, words.line)?;
                 match channel {
                     0 => colours.push(DVec3::splat(value)),
-                    _ => colours[at][channel] = value,
+                    _ => colours[a * about + b][channel] = value,
                 }
-                at += 1;
             }
         }
         words.one_of(&["DataEnd"])?;
     }
-    let angles = incidence.iter().flat_map(|&a| {
-        let radial = &radial;
-        azimuth
-            .iter()
-            .flat_map(move |&b| radial.iter().map(move |&c| [a, crate::coordinates::folded(b), c]))
-    });
-    let nodes: Vec<([f64; 3], DVec3)> = angles
-        .zip(colours)
-        .map(|(angles, colour)| (angles, if xyz { rgb_of_xyz(colour) } else { colour }))
-        .collect();
-    let names = ["AngleOfIncidence", "ScatterAzimuth", "ScatterRadial"];
-    Ok(Box::new(Lattice::from_nodes(MIRROR, names, &nodes, None)?))
+    if xyz {
+        colours
+            .iter_mut()
+            .for_each(|colour| *colour = rgb_of_xyz(*colour));
+    }
+    Ok(colours)
 }

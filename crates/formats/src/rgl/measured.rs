@@ -50,84 +50,26 @@ impl Measured {
         let ([azimuths], _) = tensor.floats::<1>("phi_i")?;
         if azimuths > 2 {
             let found = format!("{azimuths} azimuths of incidence");
-            return Err(Error::malformed(
-                Place::Field("phi_i".into()),
-                found,
-                "1 or 2: an isotropic specimen",
-            ));
+            return Err(refuse("phi_i", found, "1 or 2: an isotropic specimen"));
         }
         let ([t], theta_i) = tensor.floats::<1>("theta_i")?;
         let within = theta_i.iter().all(|theta| (-1e-6..=THETA_MAX).contains(theta));
         if !(within && theta_i.is_sorted_by(|a, b| a < b)) {
-            let allowed = "ascending angles of 0 … π/2 rad";
-            return Err(Error::malformed(
-                Place::Field("theta_i".into()),
-                "others",
-                allowed,
-            ));
-        }
-        let ndf = Plane::read(&tensor, "ndf")?;
-        let sigma = Plane::read(&tensor, "sigma")?;
-        let (shape, density) = tensor.floats::<4>("vndf")?;
-        let [_, _, rows, columns] = shape;
-        if shape[0] != azimuths || shape[1] != t || rows < 2 || columns < 2 || density.len() > MOST_NODES {
-            let allowed = format!("{azimuths} × {t} × n × m with n and m from 2");
-            return Err(Error::malformed(
-                Place::Field("vndf".into()),
-                format!("shape {shape:?}"),
-                allowed,
-            ));
-        }
-        let mut density = density;
-        density.truncate(t * rows * columns);
-        density.iter_mut().for_each(|density| *density = density.max(0.0));
-        let (name, weights) = if tensor.has(b"rgb") {
-            ("rgb", vec![DVec3::X, DVec3::Y, DVec3::Z])
-        } else {
-            let (_, nm) = tensor.floats::<1>("wavelengths")?;
-            if !nm.is_sorted_by(|a, b| a < b) {
-                let place = Place::Field("wavelengths".into());
-                return Err(Error::malformed(place, "others", "ascending wavelengths in nm"));
-            }
-            ("spectra", channels_of_spectrum(&nm))
-        };
-        let (shape, table) = tensor.floats::<5>(name)?;
-        let side = shape[3];
-        let fits = shape[..3] == [azimuths, t, weights.len()] && shape[4] == side && side >= 2;
-        if !fits || table.len() > MOST_NODES {
-            let allowed = format!("{azimuths} × {t} × {} × m × m with m from 2", weights.len());
-            return Err(Error::malformed(
-                Place::Field(name.into()),
-                format!("shape {shape:?}"),
-                allowed,
-            ));
-        }
-        let area = side * side;
-        let mut values = vec![DVec3::ZERO; t * area];
-        for (at, value) in values.iter_mut().enumerate() {
-            let (slice, node) = (at / area, at % area);
-            for (c, weight) in weights.iter().enumerate() {
-                *value += *weight * table[(slice * weights.len() + c) * area + node];
-            }
+            return Err(refuse("theta_i", "others", "ascending angles of 0 … π/2 rad"));
         }
         let jacobian = tensor.0.iter().find(|field| field.name == b"jacobian");
-        let jacobian = match jacobian {
-            Some(field) if field.kind == Kind::U8 && field.data.len() == 1 => field.data[0] != 0,
-            _ => {
-                return Err(Error::malformed(
-                    Place::Field("jacobian".into()),
-                    "none",
-                    "an array of one byte",
-                ));
-            }
-        };
+        let jacobian = jacobian.filter(|field| field.kind == Kind::U8 && field.data.len() == 1);
+        let (side, values) = values(&tensor, azimuths, t)?;
         Ok(Self {
-            ndf,
-            sigma,
-            vndf: Warp::new(theta_i, rows, columns, density),
+            ndf: Plane::read(&tensor, "ndf")?,
+            sigma: Plane::read(&tensor, "sigma")?,
+            vndf: normals(&tensor, azimuths, theta_i)?,
             side,
             values,
-            jacobian,
+            jacobian: match jacobian {
+                Some(field) => field.data[0] != 0,
+                None => return Err(refuse("jacobian", "none", "an array of one byte")),
+            },
         })
     }
 
@@ -174,6 +116,53 @@ impl Brdf for Measured {
         let finite = value.min(DVec3::splat(crate::text::LARGEST)).max(DVec3::ZERO);
         DVec3::select(finite.is_finite_mask(), finite, DVec3::ZERO)
     }
+}
+
+/// An error in a field.
+fn refuse(field: &str, found: impl Into<String>, allowed: impl Into<String>) -> Error {
+    Error::malformed(Place::Field(field.into()), found, allowed)
+}
+
+/// The densities of visible normals; those of another azimuth of incidence are the same.
+fn normals(tensor: &Tensor<'_>, azimuths: usize, theta_i: Vec<f64>) -> Result<Warp, Error> {
+    let (shape, mut density) = tensor.floats::<4>("vndf")?;
+    let (t, [_, _, rows, columns]) = (theta_i.len(), shape);
+    if shape[..2] != [azimuths, t] || rows < 2 || columns < 2 || density.len() > MOST_NODES {
+        let allowed = format!("{azimuths} × {t} × n × m with n and m from 2");
+        return Err(refuse("vndf", format!("shape {shape:?}"), allowed));
+    }
+    density.truncate(t * rows * columns);
+    density.iter_mut().for_each(|density| *density = density.max(0.0));
+    Ok(Warp::new(theta_i, rows, columns, density))
+}
+
+/// The nodes of a side of the square of s and what is stored there, RGB.
+fn values(tensor: &Tensor<'_>, azimuths: usize, t: usize) -> Result<(usize, Vec<DVec3>), Error> {
+    let (name, weights) = if tensor.has(b"rgb") {
+        ("rgb", vec![DVec3::X, DVec3::Y, DVec3::Z])
+    } else {
+        let (_, nm) = tensor.floats::<1>("wavelengths")?;
+        if !nm.is_sorted_by(|a, b| a < b) {
+            return Err(refuse("wavelengths", "others", "ascending wavelengths in nm"));
+        }
+        ("spectra", channels_of_spectrum(&nm))
+    };
+    let (shape, table) = tensor.floats::<5>(name)?;
+    let side = shape[3];
+    let fits = shape[..3] == [azimuths, t, weights.len()] && shape[4] == side && side >= 2;
+    if !fits || table.len() > MOST_NODES {
+        let allowed = format!("{azimuths} × {t} × {} × m × m with m from 2", weights.len());
+        return Err(refuse(name, format!("shape {shape:?}"), allowed));
+    }
+    let area = side * side;
+    let mut values = vec![DVec3::ZERO; t * area];
+    for (at, value) in values.iter_mut().enumerate() {
+        let (slice, node) = (at / area, at % area);
+        for (c, weight) in weights.iter().enumerate() {
+            *value += *weight * table[(slice * weights.len() + c) * area + node];
+        }
+    }
+    Ok((side, values))
 }
 
 /// A table over the unit square of θ and φ, bilinear.

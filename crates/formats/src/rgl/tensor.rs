@@ -142,55 +142,7 @@ impl<'a> Tensor<'a> {
                 format!("at most {MOST_FIELDS}"),
             ));
         }
-        let mut fields = Vec::new();
-        for _ in 0..count {
-            let length = usize::from(u16::from_le_bytes(cursor.array()?));
-            let name = cursor.take(length)?;
-            let here = cursor.at as u64;
-            let dimensions = u16::from_le_bytes(cursor.array()?);
-            let code = cursor.take(1)?[0];
-            let start = u64::from_le_bytes(cursor.array()?);
-            if dimensions > MOST_DIMENSIONS {
-                let found = format!("{dimensions} dimensions");
-                return Err(Error::malformed(
-                    Place::Byte(here),
-                    found,
-                    format!("at most {MOST_DIMENSIONS}"),
-                ));
-            }
-            let Some((_, size)) = TYPES.into_iter().find(|(known, _)| *known == code) else {
-                return Err(Error::malformed(
-                    Place::Byte(here + 2),
-                    format!("type {code}"),
-                    "types 1 … 11",
-                ));
-            };
-            let mut shape = Vec::new();
-            let mut length = Some(size);
-            for _ in 0..dimensions {
-                let n = usize::try_from(u64::from_le_bytes(cursor.array()?)).ok();
-                length = length.zip(n).and_then(|(length, n)| length.checked_mul(n));
-                shape.push(n.unwrap_or(usize::MAX));
-            }
-            let start = usize::try_from(start).ok();
-            let end = start
-                .zip(length)
-                .and_then(|(start, length)| start.checked_add(length));
-            let Some(data) = start.zip(end).and_then(|(start, end)| bytes.get(start..end)) else {
-                let found = format!(
-                    "an array of shape {shape:?} at byte {}",
-                    start.unwrap_or(usize::MAX)
-                );
-                let allowed = format!("arrays within the {} bytes of the file", bytes.len());
-                return Err(Error::malformed(Place::Byte(here), found, allowed));
-            };
-            fields.push(Field {
-                name,
-                kind: Kind::of(code),
-                shape,
-                data: data.into(),
-            });
-        }
+        let fields = (0..count).map(|_| cursor.field()).collect::<Result<_, _>>()?;
         Ok(Self(fields))
     }
 
@@ -253,5 +205,55 @@ impl<'a> Cursor<'a> {
     fn array<const N: usize>(&mut self) -> Result<[u8; N], Error> {
         let taken = self.take(N)?;
         Ok(taken.try_into().expect("as many bytes as were asked for"))
+    }
+
+    /// A field of the list, with its array, which may lie anywhere in the bytes.
+    fn field(&mut self) -> Result<Field<'a>, Error> {
+        let length = usize::from(u16::from_le_bytes(self.array()?));
+        let name = self.take(length)?;
+        let here = self.at as u64;
+        let dimensions = u16::from_le_bytes(self.array()?);
+        let code = self.take(1)?[0];
+        let start = u64::from_le_bytes(self.array()?);
+        if dimensions > MOST_DIMENSIONS {
+            let found = format!("{dimensions} dimensions");
+            return Err(Error::malformed(
+                Place::Byte(here),
+                found,
+                format!("at most {MOST_DIMENSIONS}"),
+            ));
+        }
+        let Some((_, size)) = TYPES.into_iter().find(|(known, _)| *known == code) else {
+            return Err(Error::malformed(
+                Place::Byte(here + 2),
+                format!("type {code}"),
+                "types 1 … 11",
+            ));
+        };
+        let mut shape = Vec::new();
+        let mut length = Some(size);
+        for _ in 0..dimensions {
+            let n = usize::try_from(u64::from_le_bytes(self.array()?)).ok();
+            length = length.zip(n).and_then(|(length, n)| length.checked_mul(n));
+            shape.push(n.unwrap_or(usize::MAX));
+        }
+        let start = usize::try_from(start).ok();
+        let end = start
+            .zip(length)
+            .and_then(|(start, length)| start.checked_add(length));
+        let Some(data) = start.zip(end).and_then(|(start, end)| self.bytes.get(start..end)) else {
+            let found = format!(
+                "an array of shape {shape:?} at byte {}",
+                start.unwrap_or(usize::MAX)
+            );
+            let allowed = format!("arrays within the {} bytes of the file", self.bytes.len());
+            return Err(Error::malformed(Place::Byte(here), found, allowed));
+        };
+        Ok(Field {
+            name,
+            kind: Kind::of(code),
+            shape,
+            data: data.into(),
+        })
     }
 }
