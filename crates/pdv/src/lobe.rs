@@ -26,6 +26,18 @@ struct Curve {
     to: f64,
     /// ln G over [`warped`] θ_h.
     log: Factor,
+    /// ln f as it was read, over the same.
+    read: Factor,
+}
+
+/// What a [`Lobe`] is made of, for one reading and for the peak.
+pub(crate) struct Shown<G, R, P> {
+    /// ln G of a reading.
+    pub(crate) log_g: G,
+    /// ln f of a reading.
+    pub(crate) read: R,
+    /// ln f of the peak at a difference angle, rad.
+    pub(crate) peak: P,
 }
 
 impl Curve {
@@ -51,22 +63,31 @@ fn warped(theta_h: f64) -> f64 {
 }
 
 impl Lobe {
-    /// The lobe of sides whose points are given ln G by `log_g`.
+    /// The lobe of sides.
     ///
     /// A side that begins near the peak counts as known from there, with G = 1 at the peak itself if `tied`.
-    pub(crate) fn new(sides: &[Side], tied: bool, log_g: impl Fn(&Point) -> DVec3) -> Result<Self, Error> {
+    pub(crate) fn new(
+        sides: &[Side],
+        tied: bool,
+        shown: &Shown<impl Fn(&Point) -> DVec3, impl Fn(&Point) -> DVec3, impl Fn(f64) -> DVec3>,
+    ) -> Result<Self, Error> {
         let curve = |side: &Side| {
             let x = |theta_h: f64| warped(theta_h.abs());
             let first = side.points[0].theta_h.abs();
-            let shown = first < HIDDEN;
-            let peak = (tied && shown && first > 0.0).then_some((x(0.0), DVec3::ZERO));
-            let points = side.points.iter().map(|p| (x(p.theta_h), log_g(p)));
+            let from_peak = first < HIDDEN;
+            // The peak itself, where the side has not read it.
+            let added = |log: DVec3| (tied && from_peak && first > 0.0).then_some((x(0.0), log));
+            let points = |log: &dyn Fn(&Point) -> DVec3| -> Vec<(f64, DVec3)> {
+                side.points.iter().map(|p| (x(p.theta_h), log(p))).collect()
+            };
+            let (log, read) = (points(&shown.log_g), points(&shown.read));
             Ok(Curve {
                 theta_r: side.theta_r,
                 sign: side.sign,
-                from: if shown { 0.0 } else { first },
+                from: if from_peak { 0.0 } else { first },
                 to: side.points[side.points.len() - 1].theta_h.abs(),
-                log: Factor::new("G", peak.into_iter().chain(points))?,
+                log: Factor::new("G", added(DVec3::ZERO).into_iter().chain(log))?,
+                read: Factor::new("G", added((shown.peak)(side.theta_r)).into_iter().chain(read))?,
             })
         };
         Ok(Self {
@@ -87,6 +108,35 @@ impl Lobe {
             (None, None) => self
                 .nearest(theta_h, without)
                 .map_or(DVec3::ZERO, |n| self.curves[n].log.at(x)),
+        }
+    }
+
+    /// ln f between the readings beside a place, and ln of the share that it is of the peak at its own difference angle,
+    /// at most 0; between two sides both are linear in θ_d, as [`Lobe::log`] is. `peak` gives ln f of the peak.
+    #[inline]
+    pub(crate) fn read(
+        &self,
+        theta_h: f64,
+        theta_d: f64,
+        without: Option<usize>,
+        peak: impl Fn(f64) -> DVec3,
+    ) -> [DVec3; 2] {
+        let x = warped(theta_h);
+        let at = |n: usize| {
+            let curve = &self.curves[n];
+            let read = curve.read.at(x);
+            [read, (read - peak(curve.theta_d(theta_h))).min(DVec3::ZERO)]
+        };
+        match self.neighbours(theta_h, theta_d, without) {
+            (Some((low, a)), Some((high, b))) => {
+                let share = (theta_d - low) / (high - low);
+                let ([a, below_a], [b, below_b]) = (at(a), at(b));
+                [a.lerp(b, share), below_a.lerp(below_b, share)]
+            }
+            (Some((_, n)), None) | (None, Some((_, n))) => at(n),
+            (None, None) => self
+                .nearest(theta_h, without)
+                .map_or([DVec3::NEG_INFINITY, DVec3::ZERO], at),
         }
     }
 

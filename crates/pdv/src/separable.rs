@@ -9,8 +9,9 @@ use crate::{Error, Factor, FactorTable, Model, Observation};
 const BLACK: f64 = 1e-6;
 /// What rounding may carry a squared sine below the first that was read.
 const ROUNDING: f64 = 1e-12;
-/// Largest ln(1 + ρ), ρ = 1e13 sr⁻¹.
-const LOG_MAX: f64 = 30.0;
+/// How far, as a factor, ρ may lie above the brightest reading of its channel: F is a ratio, and where G(x) is faint it
+/// would carry noise to wherever G is bright.
+const ABOVE: f64 = 2.0;
 /// Largest difference of θ_r within a plane, rad: what a servo may stand off its goal, and no other plane.
 pub(crate) const THETA_R_SPREAD: f64 = 0.02;
 /// Largest difference of d_p within an arc.
@@ -21,8 +22,8 @@ const OFFSET_SPREAD: f64 = 0.05;
 /// G is what a plane at θ_r^dp measures and F_m what an arc measures that keeps d_p = x; both in ln(1 + ρ), per
 /// channel. Where G was measured on both sides of the mirror direction they are averaged, see
 /// [`Separable::from_observations`]. Beyond the measured ranges both factors are held constant, which
-/// [`Model::extrapolated`] tells; ln(1 + ρ) is kept within 0 … 30 (ρ = 1e13 sr⁻¹), so that no product of factors
-/// overflows. Not reciprocal, since F depends on ω_o alone.
+/// [`Model::extrapolated`] tells; in each channel ρ is kept within 0 … twice the brightest reading of that channel. Not
+/// reciprocal, since F depends on ω_o alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Separable {
     theta_r: f64,
@@ -30,6 +31,8 @@ pub struct Separable {
     /// Over sin² θ_r and d_p², which need neither angle nor root at evaluation.
     f: Factor,
     g: Factor,
+    /// The largest ln(1 + ρ).
+    most: DVec3,
     dropped: usize,
 }
 
@@ -49,6 +52,9 @@ impl Separable {
     /// differ by more than 0.02 rad or 0.05 and so belong to several sweeps.
     pub fn from_observations(plane: &[Observation], arc: &[Observation]) -> Result<Self, Error> {
         let sides = Sides::new(plane)?;
+        let readings = plane.iter().chain(arc).filter(|o| o.rgb.is_finite());
+        let brightest = readings.fold(DVec3::ZERO, |most, o| most.max(o.rgb));
+        let most = (ABOVE * brightest).map(f64::ln_1p);
         let g = sides.factor()?;
         let theta_r = steady(
             "θ_r of a plane, in rad,",
@@ -62,6 +68,7 @@ impl Separable {
                 intersection: 0.0,
                 f,
                 g,
+                most,
                 dropped: sides.dropped(),
             });
         }
@@ -76,6 +83,7 @@ impl Separable {
             intersection,
             f,
             g,
+            most,
             dropped,
         })
     }
@@ -162,7 +170,11 @@ impl Brdf for Separable {
         }
         let [sin_o, d_p] = squares(incident, exitant);
         let log = self.f.at(sin_o) * self.g.at(d_p);
-        DVec3::new(exp_m1(log.x), exp_m1(log.y), exp_m1(log.z))
+        DVec3::new(
+            exp_m1(log.x, self.most.x),
+            exp_m1(log.y, self.most.y),
+            exp_m1(log.z, self.most.z),
+        )
     }
 }
 
@@ -211,11 +223,11 @@ impl Model for Separable {
     }
 }
 
-/// eˣ − 1 with x kept within 0 … [`LOG_MAX`]: rounding may put a cubic just below its nodes.
+/// eˣ − 1 with x kept within 0 … `most`: rounding may put a cubic just below its nodes.
 #[inline]
-fn exp_m1(x: f64) -> f64 {
+fn exp_m1(x: f64, most: f64) -> f64 {
     let x = if x > 0.0 { x } else { 0.0 };
-    (if x < LOG_MAX { x } else { LOG_MAX }).exp_m1()
+    (if x < most { x } else { most }).exp_m1()
 }
 
 /// sin² θ_o and d_p² with d_p = |L_p − R_p| and R_p = −V_p, from unit vectors without any angle.

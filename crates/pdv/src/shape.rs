@@ -51,60 +51,37 @@ pub(crate) struct Excess {
     pub(crate) diffuse: DVec3,
     /// The least that counts as above the floor, sr⁻¹; 0 in a black channel.
     pub(crate) least: DVec3,
-    /// The largest G·F, so that a ratio of two readings near the floor does not run away where F is large.
-    pub(crate) most: DVec3,
 }
 
 impl Excess {
     /// What lies this share of the floor above it is not told from it: a ratio of less would be one of noise.
     const TOLD: f64 = 1e-3;
-    /// How far, as a factor, the lobe may rise above everything that was read.
-    const RISE: f64 = 2.0;
 
     /// The floor of readings; `least` is what can be told from black, 0 in a black channel.
-    pub(crate) fn new<'a>(
-        shape: Shape,
-        least: DVec3,
-        readings: impl Iterator<Item = &'a Point> + Clone,
-    ) -> Self {
+    pub(crate) fn new<'a>(shape: Shape, least: DVec3, readings: impl Iterator<Item = &'a Point>) -> Self {
         let smallest = readings
-            .clone()
             .map(|p| p.rgb / shape.falloff(p.cosines))
             .fold(DVec3::INFINITY, DVec3::min);
         let diffuse = shape.diffuse * smallest;
         let black = least.cmpeq(DVec3::ZERO);
-        let excess = Self {
+        Self {
             shape,
             diffuse,
             least: DVec3::select(black, DVec3::ZERO, least.max(Self::TOLD * diffuse)),
-            most: DVec3::INFINITY,
-        };
-        let most = readings
-            .map(|p| excess.ratio(p.rgb, p.cosines))
-            .fold(DVec3::ZERO, DVec3::max);
-        Self {
-            most: (Self::RISE * most).map(f64::ln_1p),
-            ..excess
         }
     }
 
     /// G·F of a reflectance: ln(1 + excess/(s V)).
     #[inline]
     pub(crate) fn log(&self, rgb: DVec3, cosines: Cosines) -> DVec3 {
-        self.ratio(rgb, cosines).map(f64::ln_1p)
-    }
-
-    /// excess/(s V) of a reflectance.
-    #[inline]
-    fn ratio(&self, rgb: DVec3, cosines: Cosines) -> DVec3 {
         let excess = (rgb - self.diffuse * self.shape.falloff(cosines)).max(self.least);
-        excess / self.shape.lobe_scale(cosines)
+        (excess / self.shape.lobe_scale(cosines)).map(f64::ln_1p)
     }
 
     /// The reflectance of a G·F.
     #[inline]
     pub(crate) fn reflectance(&self, log: DVec3, cosines: Cosines) -> DVec3 {
-        let lobe = log.min(self.most).map(f64::exp_m1);
+        let lobe = log.map(f64::exp_m1);
         self.diffuse * self.shape.falloff(cosines) + lobe * self.shape.lobe_scale(cosines)
     }
 }

@@ -8,6 +8,9 @@ use crate::{Error, Observation, light_angle};
 const SAME: f64 = 1e-7;
 /// The least reflectance, sr⁻¹, that is told from black.
 const LEAST: f64 = 1e-9;
+/// Near the peak a reading of less than this share of the faintest one far from it is black: a channel that vanishes at the
+/// peak is not followed through more decades than it has elsewhere.
+const TOLD: f64 = 1e-3;
 
 /// A reading by its half and difference angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,10 +123,12 @@ impl Sweeps {
             along = peaks;
         }
         let readings = || planes.iter().flatten().chain(arc).filter(|o| o.rgb.is_finite());
+        let least = least(readings().map(|o| o.rgb));
+        let black = least.cmpeq(DVec3::ZERO);
         Ok(Self {
-            sides,
             arc: along,
-            least: least(readings().map(|o| o.rgb)),
+            least: DVec3::select(black, DVec3::ZERO, least.max(TOLD * faintest_far(&sides))),
+            sides,
             dropped,
         })
     }
@@ -150,6 +155,19 @@ fn merged<'a>(points: impl Iterator<Item = &'a Point>) -> Vec<Point> {
         .chunk_by(|a, b| b.theta_h.abs() - a.theta_h.abs() < SAME)
         .map(mean)
         .collect()
+}
+
+/// Per channel the faintest reading of the outer halves of the sides; 0 where there is none.
+fn faintest_far(sides: &[Side]) -> DVec3 {
+    let far = sides
+        .iter()
+        .flat_map(|side| &side.points[side.points.len() / 2..]);
+    let faintest = far.fold(DVec3::INFINITY, |least, p| least.min(p.rgb));
+    if faintest.is_finite() {
+        faintest
+    } else {
+        DVec3::ZERO
+    }
 }
 
 /// Per channel what is told from black: at least the root mean square of the readings below 0, which are noise.

@@ -175,31 +175,33 @@ impl Table {
         }
     }
 
-    /// Half of what the table misses in the middle of its cells goes to their corners: a surface between chords.
+    /// Half of what the table misses in the middle of its cells goes to their corners: a surface between chords. No corner
+    /// becomes brighter than it was and than the middles beside it, so that no light is made up.
     fn settle(mut self, in_plane: impl Fn(Bisected) -> DVec3) -> Self {
-        let mut shift = vec![(Vec3::ZERO, 0.0_f32); ROWS * COLUMNS];
+        let mut shift = vec![(Vec3::ZERO, 0.0_f32, Vec3::splat(-LOG_MAX)); ROWS * COLUMNS];
         for row in 0..ROWS - 1 {
             for column in 0..COLUMNS - 1 {
                 let pose = pose(self.axis, column as f64 + 0.5, row as f64 + 0.5);
                 let middle = self.at(row * STRIDE + 3 * column, 0.5, 0.5);
-                let missed = logs(in_plane(pose)) - middle.truncate();
+                let true_middle = logs(in_plane(pose));
+                let missed = true_middle - middle.truncate();
                 for (r, c) in [
                     (row, column),
                     (row, column + 1),
                     (row + 1, column),
                     (row + 1, column + 1),
                 ] {
-                    let (sum, cells) = &mut shift[r * COLUMNS + c];
+                    let (sum, cells, brightest) = &mut shift[r * COLUMNS + c];
                     *sum += missed;
                     *cells += 1.0;
+                    *brightest = brightest.max(true_middle);
                 }
             }
         }
-        for (node, (sum, cells)) in self.logs.chunks_exact_mut(3).zip(shift) {
-            let node_shift = sum * (0.5 / cells);
-            node.iter_mut()
-                .zip(node_shift.to_array())
-                .for_each(|(log, shift)| *log = bounded(*log + shift));
+        for (node, (sum, cells, brightest)) in self.logs.chunks_exact_mut(3).zip(shift) {
+            let log = Vec3::from_slice(node);
+            let settled = (log + sum * (0.5 / cells)).min(brightest.max(log));
+            settled.map(bounded).write_to_slice(node);
         }
         self
     }
