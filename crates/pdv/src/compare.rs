@@ -7,13 +7,9 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::quantile::Quantiles;
+use crate::metric::{Channels, Metrics, Tally};
 use crate::{Cell, Scene};
 
-/// Floor of relative errors, sr⁻¹: what a photometer of this kind can tell from nothing.
-const FLOOR: f64 = 1e-3;
-/// ε of the log-relative mapping (Nielsen, Jensen, Ramamoorthi 2015), in sr⁻¹ and for the cosine weight.
-const EPSILON: f64 = 1e-3;
 /// Streams of random numbers; fixed, so that the result does not depend on the number of cores.
 const STREAMS: u64 = 32;
 
@@ -39,42 +35,6 @@ impl Default for Draw {
     }
 }
 
-/// How far an estimate is from a reference.
-///
-/// All over the pairs that are valid in both. `None` where no pair is left.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Metrics {
-    /// MALE: mean |ln(1 + f cos θ_i) − ln(1 + f̂ cos θ_i)|.
-    pub male: Option<f64>,
-    /// Median of |f̂ − f|/max(f, 1e-3 sr⁻¹), to 0.2 % of itself.
-    pub median_rel: Option<f64>,
-    /// 95th percentile of the same.
-    pub p95_rel: Option<f64>,
-    /// Root mean square of the same.
-    pub rel_rms: Option<f64>,
-    /// Root mean square of ln((f̂ w + ε)/(f w + ε)), w = max(cos θ_i cos θ_o, ε), ε = 1e-3.
-    pub log_rel_rmse: Option<f64>,
-    /// Eq. 4 of the paper, relRMS/√N without a floor. It shrinks with N whatever the estimate: see `eq4_black`.
-    pub eq4: Option<f64>,
-    /// What an all-zero estimate scores in Eq. 4: 1/√N.
-    pub eq4_black: Option<f64>,
-    /// N: pairs of Eq. 4, valid in both and with a reference above 0.
-    pub pairs: u64,
-    /// Share of the drawn pairs that are not among those N.
-    pub left_out: f64,
-}
-
-/// Metrics per channel.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Channels {
-    /// Red.
-    pub r: Metrics,
-    /// Green.
-    pub g: Metrics,
-    /// Blue.
-    pub b: Metrics,
-}
-
 /// An estimate compared with a reference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Comparison {
@@ -90,6 +50,19 @@ pub struct Comparison {
 /// Compares estimates with a reference over the same pairs, which are drawn once; on all cores, in constant memory.
 ///
 /// The result depends on the draw alone, not on the number of cores.
+///
+/// ```
+/// use brdf::{Black, Lambert};
+/// use pdv::{Draw, compare};
+///
+/// let (half, darker) = (Lambert::new(0.5)?, Lambert::new(0.4)?);
+/// let draw = Draw { pairs: 10_000, ..Draw::default() };
+/// let found = compare(&half, &[&darker, &Black], &draw);
+/// assert!((found[0].overall.median_rel.unwrap() - 0.2).abs() < 0.001);
+/// // Black scores 1/√N in the paper's Eq. 4, whatever the reference.
+/// assert!((found[1].overall.eq4.unwrap() - 0.01).abs() < 1e-12);
+/// # Ok::<(), brdf::Error>(())
+/// ```
 pub fn compare(reference: &(impl Brdf + ?Sized), estimates: &[&dyn Brdf], draw: &Draw) -> Vec<Comparison> {
     compare_within(&Scene::whole(), reference, estimates, draw)
 }
@@ -104,13 +77,14 @@ pub fn compare_within(
     draw: &Draw,
 ) -> Vec<Comparison> {
     let cells = scene.below(draw.theta_max);
-    let streams: Vec<Vec<[Sums; 3]>> = (0..STREAMS)
+    let streams: Vec<Vec<[Tally; 3]>> = (0..STREAMS)
         .into_par_iter()
         .map(|stream| {
             let mut rng = ChaCha8Rng::seed_from_u64(draw.seed);
             rng.set_stream(stream);
             let share = draw.pairs / STREAMS + u64::from(stream < draw.pairs % STREAMS);
-            let mut sums: Vec<[Sums; 3]> = estimates.iter().map(|_| [(); 3].map(|()| Sums::new())).collect();
+            let mut sums: Vec<[Tally; 3]> =
+                estimates.iter().map(|_| [(); 3].map(|()| Tally::new())).collect();
             for _ in 0..share {
                 let cell = drawn(&cells, &mut rng);
                 let mut within = |[low, high]: [f64; 2]| low + rng.random::<f64>() * (high - low);
@@ -132,19 +106,17 @@ pub fn compare_within(
         .collect();
     (0..estimates.len())
         .map(|n| {
-            let mut channels = [(); 3].map(|()| Sums::new());
+            let mut channels = [(); 3].map(|()| Tally::new());
             for stream in &streams {
                 channels
                     .iter_mut()
                     .zip(&stream[n])
                     .for_each(|(sum, part)| sum.merge(part));
             }
-            let mut overall = Sums::new();
-            channels.iter().for_each(|channel| overall.merge(channel));
-            let [r, g, b] = channels.map(|channel| channel.metrics(draw.pairs, 1));
+            let (overall, channels) = Tally::of_channels(&channels, draw.pairs);
             Comparison {
-                overall: overall.metrics(draw.pairs, 3),
-                channels: Channels { r, g, b },
+                overall,
+                channels,
                 draw: *draw,
             }
         })
@@ -172,91 +144,18 @@ fn add(
     estimates: &[&dyn Brdf],
     incident: DVec3,
     exitant: DVec3,
-    sums: &mut [[Sums; 3]],
+    sums: &mut [[Tally; 3]],
 ) {
     if !reference.valid(incident, exitant) {
         return;
     }
     let f = reference.eval(incident, exitant).to_array();
-    let weight = (incident.z * exitant.z).max(EPSILON);
     for (estimate, sums) in estimates.iter().zip(sums) {
         if estimate.valid(incident, exitant) {
             let g = estimate.eval(incident, exitant).to_array();
             for (sums, (f, g)) in sums.iter_mut().zip(f.into_iter().zip(g)) {
-                sums.add(f, g, incident.z, weight);
+                sums.add(f, g, incident.z, exitant.z);
             }
-        }
-    }
-}
-
-/// Running sums of one channel.
-struct Sums {
-    valid: u64,
-    male: f64,
-    squares: f64,
-    log_squares: f64,
-    relative: Quantiles,
-    positive: u64,
-    squares_without_floor: f64,
-}
-
-impl Sums {
-    fn new() -> Self {
-        Self {
-            valid: 0,
-            male: 0.0,
-            squares: 0.0,
-            log_squares: 0.0,
-            relative: Quantiles::new(),
-            positive: 0,
-            squares_without_floor: 0.0,
-        }
-    }
-
-    #[inline]
-    fn add(&mut self, f: f64, g: f64, cos_i: f64, weight: f64) {
-        let error = g - f;
-        self.valid += 1;
-        self.male += ((1.0 + g * cos_i) / (1.0 + f * cos_i)).ln().abs();
-        let relative = error.abs() / f.max(FLOOR);
-        self.squares += relative * relative;
-        self.relative.add(relative);
-        let log = ((g * weight + EPSILON) / (f * weight + EPSILON)).ln();
-        self.log_squares += log * log;
-        if f > 0.0 {
-            self.positive += 1;
-            self.squares_without_floor += (error / f).powi(2);
-        }
-    }
-
-    fn merge(&mut self, other: &Self) {
-        self.valid += other.valid;
-        self.male += other.male;
-        self.squares += other.squares;
-        self.log_squares += other.log_squares;
-        self.relative.merge(&other.relative);
-        self.positive += other.positive;
-        self.squares_without_floor += other.squares_without_floor;
-    }
-
-    fn metrics(&self, drawn: u64, channels: u64) -> Metrics {
-        let n = self.valid as f64;
-        let some = |value: f64| (self.valid > 0).then_some(value);
-        let positive = self.positive as f64;
-        // One definition for both, so that a black estimate scores exactly what black scores.
-        let eq4 = |squares: f64| {
-            (self.positive > 0).then(|| (squares / positive).sqrt() / (positive / channels as f64).sqrt())
-        };
-        Metrics {
-            male: some(self.male / n),
-            median_rel: some(self.relative.quantile(0.5)),
-            p95_rel: some(self.relative.quantile(0.95)),
-            rel_rms: some((self.squares / n).sqrt()),
-            log_rel_rmse: some((self.log_squares / n).sqrt()),
-            eq4: eq4(self.squares_without_floor),
-            eq4_black: eq4(positive),
-            pairs: self.positive / channels,
-            left_out: 1.0 - positive / (drawn * channels).max(1) as f64,
         }
     }
 }
