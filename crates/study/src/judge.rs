@@ -3,11 +3,9 @@ use std::f64::consts::TAU;
 use brdf::{Brdf, Spherical};
 use glam::DVec3;
 use pdv::Draw;
+use pdv::metric::{absolute_log_error, quantile, relative_error};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-/// Floor of relative errors, sr⁻¹, as in [`pdv::Metrics`].
-pub(crate) const FLOOR: f64 = 1e-3;
 
 /// Pairs of directions, drawn once, on which many estimates are judged.
 #[derive(Clone, Debug)]
@@ -62,15 +60,12 @@ impl Judge {
         let mut relative = Vec::with_capacity(3 * reference.len());
         for (((incident, _), f), g) in self.pairs.iter().zip(reference).zip(estimate) {
             for (f, g) in f.to_array().into_iter().zip(g.to_array()) {
-                male += ((1.0 + g * incident.z) / (1.0 + f * incident.z)).ln().abs();
-                relative.push((g - f).abs() / f.max(FLOOR));
+                male += absolute_log_error(f, g, incident.z);
+                relative.push(relative_error(f, g));
             }
         }
         let n = relative.len();
-        let mut quantile = |q: f64| {
-            let at = ((q * n as f64) as usize).min(n - 1);
-            *relative.select_nth_unstable_by(at, f64::total_cmp).1
-        };
+        let mut quantile = |q: f64| quantile(&mut relative, q).expect("there are pairs");
         Score {
             male: male / n as f64,
             median_rel: quantile(0.5),

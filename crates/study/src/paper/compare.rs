@@ -2,11 +2,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use brdf::Brdf;
 use glam::DVec3;
+use pdv::metric::PooledSums;
 use pdv::{Draw, Separable};
 use rayon::prelude::*;
 
 use super::Row;
-use crate::judge::{FLOOR, Judge};
+use crate::judge::Judge;
 use crate::{Material, Progress};
 
 /// Pairs that are drawn at once and then used for every material: few enough to stay in the cache.
@@ -15,9 +16,6 @@ const CHUNK: u64 = 4096;
 const LANES: u64 = 64;
 /// Pairs of which quantiles are taken.
 const QUANTILE_PAIRS: u64 = 50_000;
-/// A product of ratios is turned into a logarithm when it passes this: three more of 1e13 each, the most that a model
-/// can be off, still leave it finite.
-const LARGE: f64 = 1e200;
 
 /// A material with its reconstructions.
 pub(crate) struct Case<'a> {
@@ -31,12 +29,12 @@ pub(crate) struct Case<'a> {
 pub(crate) fn compare(cases: &[Case<'_>], draw: &Draw, progress: &Progress<'_>) -> Vec<Vec<Row>> {
     let done = AtomicU64::new(0);
     let chunks = draw.pairs.div_ceil(CHUNK);
-    let lanes: Vec<Vec<Vec<Sums>>> = (0..LANES.min(chunks))
+    let lanes: Vec<Vec<Vec<PooledSums>>> = (0..LANES.min(chunks))
         .into_par_iter()
         .map(|lane| {
-            let mut sums: Vec<Vec<Sums>> = cases
+            let mut sums: Vec<Vec<PooledSums>> = cases
                 .iter()
-                .map(|case| vec![Sums::default(); case.models.len()])
+                .map(|case| vec![PooledSums::default(); case.models.len()])
                 .collect();
             for chunk in (lane..chunks).step_by(LANES as usize) {
                 let pairs = CHUNK.min(draw.pairs - chunk * CHUNK);
@@ -62,24 +60,29 @@ pub(crate) fn compare(cases: &[Case<'_>], draw: &Draw, progress: &Progress<'_>) 
                 .iter()
                 .enumerate()
                 .map(|(k, model)| {
-                    let mut sum = Sums::default();
+                    let mut sum = PooledSums::default();
                     lanes.iter().for_each(|lane| sum.merge(&lane[i][k]));
                     let score = judge.score(&reference, &judge.values(model));
-                    let row = Row {
+                    let metrics = sum.metrics(draw.pairs);
+                    Row {
                         material: case.material.name.clone(),
                         theta_r_deg: model.theta_r().to_degrees(),
+                        male: metrics.male.unwrap_or(f64::NAN),
                         median_rel: score.median_rel,
                         p95_rel: score.p95_rel,
-                        ..Row::default()
-                    };
-                    sum.row(row, draw.pairs)
+                        rel_rms: metrics.rel_rms.unwrap_or(f64::NAN),
+                        eq4: metrics.eq4,
+                        eq4_black: metrics.eq4_black,
+                        pairs: metrics.pairs,
+                        left_out: metrics.left_out,
+                    }
                 })
                 .collect()
         })
         .collect()
 }
 
-fn add(case: &Case<'_>, pairs: &[(DVec3, DVec3)], sums: &mut [Sums]) {
+fn add(case: &Case<'_>, pairs: &[(DVec3, DVec3)], sums: &mut [PooledSums]) {
     for &(incident, exitant) in pairs {
         if !case.material.brdf.valid(incident, exitant) {
             continue;
@@ -87,79 +90,6 @@ fn add(case: &Case<'_>, pairs: &[(DVec3, DVec3)], sums: &mut [Sums]) {
         let f = case.material.brdf.eval(incident, exitant);
         for (model, sums) in case.models.iter().zip(&mut *sums) {
             sums.add(f, model.eval(incident, exitant), incident.z);
-        }
-    }
-}
-
-/// Running sums over pairs and channels.
-#[derive(Clone, Debug)]
-struct Sums {
-    valid: u64,
-    /// Sum of |ln ratio| but for what is still in `ratios`.
-    male: f64,
-    /// Product of ratios ≥ 1: one logarithm for many pairs.
-    ratios: f64,
-    squares: f64,
-    positive: u64,
-    squares_without_floor: f64,
-}
-
-impl Default for Sums {
-    fn default() -> Self {
-        Self {
-            valid: 0,
-            male: 0.0,
-            ratios: 1.0,
-            squares: 0.0,
-            positive: 0,
-            squares_without_floor: 0.0,
-        }
-    }
-}
-
-impl Sums {
-    #[inline]
-    fn add(&mut self, f: DVec3, g: DVec3, cos_i: f64) {
-        let (a, b) = (f * cos_i + 1.0, g * cos_i + 1.0);
-        self.ratios *= (a.max(b) / a.min(b)).element_product();
-        if self.ratios > LARGE {
-            self.take();
-        }
-        let error = g - f;
-        self.squares += (error / f.max(DVec3::splat(FLOOR))).length_squared();
-        let positive = f.cmpgt(DVec3::ZERO);
-        let relative = DVec3::select(positive, error / f, DVec3::ZERO);
-        self.squares_without_floor += relative.length_squared();
-        self.positive += u64::from(positive.bitmask().count_ones());
-        self.valid += 3;
-    }
-
-    fn take(&mut self) {
-        self.male += self.ratios.ln();
-        self.ratios = 1.0;
-    }
-
-    fn merge(&mut self, other: &Self) {
-        self.valid += other.valid;
-        self.male += other.male + other.ratios.ln();
-        self.squares += other.squares;
-        self.positive += other.positive;
-        self.squares_without_floor += other.squares_without_floor;
-    }
-
-    fn row(&self, row: Row, drawn: u64) -> Row {
-        let n = self.valid as f64;
-        let positive = self.positive as f64;
-        let eq4 =
-            |squares: f64| (self.positive > 0).then(|| (squares / positive).sqrt() / (positive / 3.0).sqrt());
-        Row {
-            male: self.male / n,
-            rel_rms: (self.squares / n).sqrt(),
-            eq4: eq4(self.squares_without_floor),
-            eq4_black: eq4(positive),
-            pairs: self.positive / 3,
-            left_out: 1.0 - positive / (3 * drawn) as f64,
-            ..row
         }
     }
 }
