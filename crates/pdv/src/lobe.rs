@@ -112,7 +112,8 @@ impl Lobe {
     }
 
     /// ln f between the readings beside a place, and ln of the share that it is of the peak at its own difference angle,
-    /// at most 0; between two sides both are linear in θ_d, as [`Lobe::log`] is. `peak` gives ln f of the peak.
+    /// at most 0; between two sides both are linear in θ_d, as [`Lobe::log`] is. Also how far the nearest side is in θ_d,
+    /// rad. `peak` gives ln f of the peak.
     #[inline]
     pub(crate) fn read(
         &self,
@@ -120,23 +121,26 @@ impl Lobe {
         theta_d: f64,
         without: Option<usize>,
         peak: impl Fn(f64) -> DVec3,
-    ) -> [DVec3; 2] {
+    ) -> ([DVec3; 2], f64) {
         let x = warped(theta_h);
         let at = |n: usize| {
             let curve = &self.curves[n];
-            let read = curve.read.at(x);
-            [read, (read - peak(curve.theta_d(theta_h))).min(DVec3::ZERO)]
+            let (read, at) = (curve.read.at(x), curve.theta_d(theta_h));
+            ([read, (read - peak(at)).min(DVec3::ZERO)], (theta_d - at).abs())
         };
         match self.neighbours(theta_h, theta_d, without) {
             (Some((low, a)), Some((high, b))) => {
                 let share = (theta_d - low) / (high - low);
-                let ([a, below_a], [b, below_b]) = (at(a), at(b));
-                [a.lerp(b, share), below_a.lerp(below_b, share)]
+                let (([a, below_a], from_a), ([b, below_b], from_b)) = (at(a), at(b));
+                (
+                    [a.lerp(b, share), below_a.lerp(below_b, share)],
+                    from_a.min(from_b),
+                )
             }
             (Some((_, n)), None) | (None, Some((_, n))) => at(n),
             (None, None) => self
                 .nearest(theta_h, without)
-                .map_or([DVec3::NEG_INFINITY, DVec3::ZERO], at),
+                .map_or(([DVec3::NEG_INFINITY, DVec3::ZERO], 0.0), at),
         }
     }
 

@@ -13,6 +13,9 @@ const EPSILON: f64 = 0.1;
 /// How far, as a factor, f may lie above what the readings beside it allow. From 1.3 on the accuracy on the fitted
 /// materials does not depend on it: `cargo run --release -p pdv --example accuracy`.
 const ABOVE: f64 = 2.0;
+/// In how much difference angle from the nearest side, rad, that factor doubles: with one plane f is carried far, and may
+/// well rise on the way. Below it the mean over a single plane at 30° suffers by a hundredth.
+const DOUBLES: f64 = 0.4;
 /// A channel in which G·F rises to so many times its peak, farther than [`OFF_PEAK`] from it, has no lobe. The least of 2,
 /// 5, 10 and 30 at which the example's means over materials with lobes stay as they are.
 const WITHOUT_LOBE: f64 = 30.0;
@@ -36,6 +39,8 @@ pub(crate) struct Surface {
     fade: DVec3,
     /// ln f of the peak over θ_d, rad.
     peak: Factor,
+    /// The most that any value may be, sr⁻¹.
+    ceiling: DVec3,
     /// G over θ_h and θ_d.
     pub(crate) lobe: Lobe,
     /// The smallest θ_d, rad, that was read: nothing is known closer to retro-reflection.
@@ -85,6 +90,7 @@ impl Surface {
             f,
             fade,
             peak,
+            ceiling: ABOVE * brightest,
             lobe: g,
             closest: sweeps.points().map(|p| p.theta_d).fold(f64::INFINITY, f64::min),
         })
@@ -109,12 +115,14 @@ impl Surface {
     /// The most that the readings beside a pair in the plane allow, sr⁻¹.
     ///
     /// That is [`ABOVE`] times what lies between the readings at the same half angle, or, where that is brighter, the
-    /// same share of the peak at the pair's own difference angle as they are of the peak at theirs, at most all of it.
+    /// same share of the peak at the pair's own difference angle as they are of the peak at theirs, at most all of it. The
+    /// farther the next side, the more is allowed, up to [`ABOVE`] times the brightest reading.
     #[inline]
     fn most(&self, pose: Bisected, without: Option<usize>) -> DVec3 {
         let peak = |theta_d: f64| self.peak.at(theta_d);
-        let [read, share] = self.lobe.read(pose.theta_h, pose.theta_d, without, peak);
-        ABOVE * read.max(peak(pose.theta_d) + share).map(f64::exp)
+        let ([read, share], far) = self.lobe.read(pose.theta_h, pose.theta_d, without, peak);
+        let most = ABOVE * (far / DOUBLES).exp2() * read.max(peak(pose.theta_d) + share).map(f64::exp);
+        most.min(self.ceiling)
     }
 
     /// The reflectance of any pair, sr⁻¹.
