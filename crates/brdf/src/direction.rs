@@ -13,6 +13,17 @@ impl Spherical {
     /// The coordinates of a direction of any length but zero; φ = 0 along the normal.
     ///
     /// `atan2` keeps full precision at the pole and at the horizon, where `acos z` would lose half the digits.
+    ///
+    /// ```
+    /// use brdf::Spherical;
+    /// use glam::DVec3;
+    ///
+    /// let east = Spherical::from_direction(DVec3::X);
+    /// assert_eq!((east.theta.to_degrees(), east.phi), (90.0, 0.0));
+    /// // 1e-12 rad from the normal, which an arc cosine would lose.
+    /// let near = Spherical::from_direction(DVec3::new(0.0, 1e-12, 1.0));
+    /// assert!((near.theta / 1e-12 - 1.0).abs() < 1e-14);
+    /// ```
     pub fn from_direction(direction: DVec3) -> Self {
         Self {
             theta: direction.x.hypot(direction.y).atan2(direction.z),
@@ -21,6 +32,14 @@ impl Spherical {
     }
 
     /// The unit vector (sin θ cos φ, sin θ sin φ, cos θ).
+    ///
+    /// ```
+    /// use brdf::Spherical;
+    /// use std::f64::consts::FRAC_PI_4;
+    ///
+    /// let direction = Spherical { theta: FRAC_PI_4, phi: 0.0 }.direction();
+    /// assert!((direction.x - direction.z).abs() < 1e-15 && direction.y == 0.0);
+    /// ```
     pub fn direction(self) -> DVec3 {
         let (sin_theta, cos_theta) = self.theta.sin_cos();
         let (sin_phi, cos_phi) = self.phi.sin_cos();

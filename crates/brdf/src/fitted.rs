@@ -62,6 +62,13 @@ fn parse(line: &'static str) -> Option<(&'static str, Fitted)> {
 
 impl Fitted {
     /// The material of that name, e.g. `"alum-bronze"`; `None` where there is none.
+    ///
+    /// ```
+    /// use brdf::Fitted;
+    ///
+    /// assert!(Fitted::named("alum-bronze").is_some());
+    /// assert!(Fitted::named("unobtainium").is_none());
+    /// ```
     pub fn named(name: &str) -> Option<Self> {
         TABLE
             .iter()
@@ -70,6 +77,13 @@ impl Fitted {
     }
 
     /// All materials with their names, in alphabetical order.
+    ///
+    /// ```
+    /// use brdf::Fitted;
+    ///
+    /// assert_eq!(Fitted::all().len(), 100);
+    /// assert_eq!(Fitted::all().next().map(|(name, _)| name), Some("alum-bronze"));
+    /// ```
     pub fn all() -> impl ExactSizeIterator<Item = (&'static str, Self)> {
         TABLE.iter().copied()
     }

@@ -20,6 +20,16 @@ impl HalfDifference {
     /// Total: where the half vector is the normal its azimuth is taken as 0, where the directions coincide φ_d is 0,
     /// and opposite directions, which have no half vector, are given the normal. φ_d is conditioned like
     /// 1/(sin θ_h · sin θ_d), the directions that belong to it are not.
+    ///
+    /// ```
+    /// use brdf::HalfDifference;
+    /// use glam::DVec3;
+    ///
+    /// // A light that grazes one way and a viewer that looks along the normal.
+    /// let angles = HalfDifference::from_directions(DVec3::X, DVec3::Z);
+    /// assert!((angles.theta_h.to_degrees() - 45.0).abs() < 1e-12);
+    /// assert!((angles.theta_d.to_degrees() - 45.0).abs() < 1e-12);
+    /// ```
     pub fn from_directions(incident: DVec3, exitant: DVec3) -> Self {
         let sum = incident + exitant;
         let difference = incident - exitant;
@@ -48,6 +58,16 @@ impl HalfDifference {
     }
 
     /// Incident and exitant unit vectors with the half vector in the x–z plane; either may lie below the horizon.
+    ///
+    /// ```
+    /// use brdf::HalfDifference;
+    ///
+    /// let angles = HalfDifference { theta_h: 0.3, theta_d: 0.5, phi_d: 1.0 };
+    /// let (incident, exitant) = angles.directions();
+    /// assert!((incident.dot(exitant) - 1.0_f64.cos()).abs() < 1e-15, "2 θ_d lie between them");
+    /// let back = HalfDifference::from_directions(incident, exitant);
+    /// assert!((back.phi_d - 1.0).abs() < 1e-14);
+    /// ```
     pub fn directions(self) -> (DVec3, DVec3) {
         let (sin_h, cos_h) = self.theta_h.sin_cos();
         let (sin_d, cos_d) = self.theta_d.sin_cos();

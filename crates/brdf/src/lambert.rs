@@ -15,6 +15,16 @@ impl Lambert {
     ///
     /// # Errors
     /// `albedo` is outside 0 … 1.
+    ///
+    /// ```
+    /// use brdf::{Brdf, Lambert};
+    /// use glam::DVec3;
+    ///
+    /// let half = Lambert::new(0.5)?;
+    /// assert_eq!(half.eval(DVec3::Z, DVec3::Z).x, 0.5 / std::f64::consts::PI);
+    /// assert!(Lambert::new(1.1).is_err());
+    /// # Ok::<(), brdf::Error>(())
+    /// ```
     pub fn new(albedo: f64) -> Result<Self, Error> {
         if !(0.0..=1.0).contains(&albedo) {
             return Err(Error::Parameter {

@@ -30,6 +30,18 @@ impl MerlTable {
     }
 
     /// Tabulates a BRDF at every node, on all cores; −1 where either direction is at or below the horizon.
+    ///
+    /// ```
+    /// use brdf::{Brdf, Lambert, MerlTable};
+    /// use glam::DVec3;
+    ///
+    /// let table = MerlTable::fill(&Lambert::new(0.5)?);
+    /// let f = table.eval(DVec3::new(0.6, 0.0, 0.8), DVec3::Z);
+    /// assert!((f.x - 0.5 / std::f64::consts::PI).abs() < 1e-15);
+    /// // The last node of θ_h and θ_d lies below the horizon.
+    /// assert_eq!(table.node([89, 89, 0]).x, -1.0);
+    /// # Ok::<(), brdf::Error>(())
+    /// ```
     pub fn fill(brdf: &(impl Brdf + ?Sized)) -> Self {
         let [_, rows, columns] = Self::SHAPE;
         let mut nodes = vec![[0.0; 3]; Self::NODES];
@@ -50,6 +62,15 @@ impl MerlTable {
     }
 
     /// The angles of a node by its indices of θ_h, θ_d, φ_d.
+    ///
+    /// ```
+    /// use brdf::MerlTable;
+    ///
+    /// let node = MerlTable::coordinates([9, 45, 90]);
+    /// assert!((node.theta_h.to_degrees() - 0.9).abs() < 1e-12, "90° times the square of a tenth");
+    /// assert!((node.theta_d.to_degrees() - 45.0).abs() < 1e-12);
+    /// assert!((node.phi_d.to_degrees() - 90.0).abs() < 1e-12);
+    /// ```
     pub fn coordinates(index: [usize; 3]) -> HalfDifference {
         let [i, j, k] = index.map(|n| n as f64);
         HalfDifference {

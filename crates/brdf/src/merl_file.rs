@@ -46,6 +46,20 @@ impl MerlTable {
     ///
     /// # Errors
     /// As [`MerlTable::read`], without the path.
+    ///
+    /// ```
+    /// use brdf::{Lambert, MerlTable};
+    ///
+    /// let table = MerlTable::fill(&Lambert::new(0.5)?);
+    /// let mut bytes = Vec::new();
+    /// table.write_to(&mut bytes).expect("memory takes it all");
+    /// assert_eq!(bytes.len() as u64, MerlTable::FILE_BYTES);
+    /// let back = MerlTable::read_from(&bytes[..])?;
+    /// assert!((back.node([0, 0, 0]) - table.node([0, 0, 0])).abs().max_element() < 1e-15);
+    /// // What ends too soon is refused.
+    /// assert!(MerlTable::read_from(&bytes[..1000]).is_err());
+    /// # Ok::<(), brdf::Error>(())
+    /// ```
     pub fn read_from(mut stream: impl Read) -> Result<Self, Error> {
         let io = |source| Error::Stream { what: "read", source };
         let mut bytes = vec![0; HEADER_BYTES.max(PLANE_BYTES)];

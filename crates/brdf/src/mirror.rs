@@ -26,6 +26,16 @@ impl Mirror {
     ///
     /// # Errors
     /// A parameter is outside its range.
+    ///
+    /// ```
+    /// use brdf::{Brdf, Mirror};
+    /// use glam::DVec3;
+    ///
+    /// let mirror = Mirror::new(0.9, Mirror::HALF_ANGLE_RAD)?;
+    /// let solid_angle_sr = std::f64::consts::PI * Mirror::HALF_ANGLE_RAD.sin().powi(2);
+    /// assert!((mirror.eval(DVec3::Z, DVec3::Z).x * solid_angle_sr / 0.9 - 1.0).abs() < 1e-12);
+    /// # Ok::<(), brdf::Error>(())
+    /// ```
     pub fn new(reflectance: f64, half_angle_rad: f64) -> Result<Self, Error> {
         if !(0.0..=1.0).contains(&reflectance) {
             return Err(Error::Parameter {

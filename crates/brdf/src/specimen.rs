@@ -11,6 +11,17 @@ use crate::{Black, Brdf, Error, Fitted, Lambert, MerlTable, Mirror};
 /// # Errors
 /// No such material (near names are suggested), a number that is none or is outside 0 … 1, or a file that is no MERL
 /// table.
+///
+/// ```
+/// use brdf::{Brdf, specimen};
+/// use glam::DVec3;
+///
+/// assert_eq!(specimen("black")?.eval(DVec3::Z, DVec3::Z), DVec3::ZERO);
+/// assert_eq!(specimen("lambert:0.5")?.eval(DVec3::Z, DVec3::Z).x, 0.5 / std::f64::consts::PI);
+/// let Err(error) = specimen("alum-bronse") else { panic!("there is no such material") };
+/// assert!(error.to_string().contains("did you mean alum-bronze"));
+/// # Ok::<(), brdf::Error>(())
+/// ```
 pub fn specimen(text: &str) -> Result<Arc<dyn Brdf>, Error> {
     let text = text.trim();
     if text.is_empty() {

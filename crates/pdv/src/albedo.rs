@@ -12,6 +12,16 @@ const STEPS: usize = 4096;
 /// cos θ_i dω_i is area on the projected disk and PDV is polar there: a(θ_o) = ∫ ρ(θ_o, d) α(d) d dd, with α the arc
 /// of the circle of radius d that lies on the disk. One azimuth is exact for a BRDF that is constant along φ_p; for
 /// another ρ is the mean over `azimuths` places along the arc.
+///
+/// ```
+/// use brdf::{Lambert, Mirror};
+/// use pdv::albedo;
+///
+/// assert!((albedo(&Lambert::new(0.5)?, 0.7, 1).x - 0.5).abs() < 1e-3);
+/// let mirror = Mirror::new(0.9, Mirror::HALF_ANGLE_RAD)?;
+/// assert!((albedo(&mirror, 0.5, 16).x - 0.9).abs() < 0.01);
+/// # Ok::<(), brdf::Error>(())
+/// ```
 pub fn albedo(brdf: &(impl Brdf + ?Sized), theta_o: f64, azimuths: usize) -> DVec3 {
     let s = theta_o.sin();
     let mut sum = DVec3::ZERO;

@@ -38,6 +38,23 @@ impl Bivariate {
     ///
     /// # Errors
     /// As [`crate::Planes::from_observations`].
+    ///
+    /// ```
+    /// # use pdv::Observation;
+    /// # let gold = brdf::Fitted::named("gold-paint").expect("one of the fitted materials");
+    /// # let plane = |theta_r: f64| -> Vec<Observation> {
+    /// #     let deviations = [-0.04, 0.0, 0.02, 0.06, 0.15, 0.4, 0.8];
+    /// #     deviations.iter().filter_map(|&d| Observation::of(&gold, theta_r, d)).collect()
+    /// # };
+    /// # let arc: Vec<_> = [0.1, 0.5, 0.9, 1.3].iter().filter_map(|&t| Observation::of(&gold, t, 0.0)).collect();
+    ///
+    /// use brdf::Brdf;
+    ///
+    /// let model = pdv::Bivariate::from_observations(&[plane(0.3), plane(1.0)], &arc)?;
+    /// let (incident, exitant) = plane(1.0)[5].pdv().directions().expect("it was read there");
+    /// assert!((model.eval(incident, exitant) / plane(1.0)[5].rgb - 1.0).abs().max_element() < 0.1);
+    /// # Ok::<(), pdv::Error>(())
+    /// ```
     pub fn from_observations(planes: &[Vec<Observation>], arc: &[Observation]) -> Result<Self, Error> {
         let sweeps = Sweeps::new(planes, arc)?;
         let surface = Surface::new(&sweeps, PRODUCT)?;

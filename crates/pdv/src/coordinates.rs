@@ -22,6 +22,16 @@ impl Pdv {
     /// The coordinates of a pair of directions given by angles (Algorithm 1 of the paper).
     ///
     /// `None` where a zenith angle is outside 0 … π/2 or a number is not finite.
+    ///
+    /// ```
+    /// use brdf::Spherical;
+    /// use pdv::Pdv;
+    ///
+    /// let (light, viewer) = (Spherical { theta: 0.4, phi: 3.0 }, Spherical { theta: 0.6, phi: 3.0 });
+    /// let same_side = Pdv::from_angles(light, viewer).expect("both are above the horizon");
+    /// assert!((same_side.d_p - (0.4_f64.sin() + 0.6_f64.sin())).abs() < 1e-15);
+    /// assert!(Pdv::from_angles(Spherical { theta: 1.6, phi: 0.0 }, viewer).is_none());
+    /// ```
     pub fn from_angles(incident: Spherical, exitant: Spherical) -> Option<Self> {
         let upper = 0.0..=FRAC_PI_2;
         if !(upper.contains(&incident.theta) && upper.contains(&exitant.theta)) {
@@ -36,6 +46,17 @@ impl Pdv {
     ///
     /// `None` where either lies below the horizon or is not finite. Viewed along the normal, the azimuth of the
     /// viewer is taken as 0.
+    ///
+    /// ```
+    /// use glam::DVec3;
+    /// use pdv::Pdv;
+    ///
+    /// let viewer = DVec3::new(0.6, 0.0, 0.8);
+    /// // In the mirror direction there is no deviation, along the normal one of sin θ_r.
+    /// let mirror = Pdv::from_directions(DVec3::new(-0.6, 0.0, 0.8), viewer).expect("above the horizon");
+    /// let normal = Pdv::from_directions(DVec3::Z, viewer).expect("above the horizon");
+    /// assert_eq!((mirror.d_p, normal.d_p, normal.phi_p), (0.0, 0.6, 0.0));
+    /// ```
     pub fn from_directions(incident: DVec3, exitant: DVec3) -> Option<Self> {
         if !(incident.z >= 0.0 && exitant.z >= 0.0) {
             return None;
@@ -60,6 +81,13 @@ impl Pdv {
 
     /// The coordinates in the plane of the arms by the signed deviation: positive towards the normal (φ_p = 0),
     /// negative outwards (φ_p = π).
+    ///
+    /// ```
+    /// use pdv::Pdv;
+    ///
+    /// assert_eq!(Pdv::in_plane(0.6, 0.2).phi_p, 0.0);
+    /// assert_eq!(Pdv::in_plane(0.6, -0.2).phi_p, std::f64::consts::PI);
+    /// ```
     pub fn in_plane(theta_r: f64, deviation: f64) -> Self {
         Self {
             theta_r,
@@ -85,6 +113,16 @@ impl Pdv {
     ///
     /// The paper divides by cos φ_i, which is 0 at φ_i = ±90°; sin θ_i = |L_p| needs no division. θ_i is conditioned
     /// like 1/cos θ_i: at the rim half the digits are lost, and going back regains them.
+    ///
+    /// ```
+    /// use pdv::Pdv;
+    ///
+    /// // Where the paper divides by cos φ_i = 0: a light beside the plane.
+    /// let pdv = Pdv { theta_r: 0.0, d_p: 0.5, phi_p: std::f64::consts::FRAC_PI_2 };
+    /// let (light, _) = pdv.angles().expect("it is on the disk");
+    /// assert!((light.theta.sin() - 0.5).abs() < 1e-15);
+    /// assert!((light.phi - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+    /// ```
     pub fn angles(self) -> Option<(Spherical, Spherical)> {
         let light = self.light()?;
         let sin = light.x.hypot(light.y);
@@ -102,6 +140,16 @@ impl Pdv {
     }
 
     /// Incident and exitant unit vectors, the viewer at azimuth 0; `None` as in [`Pdv::angles`].
+    ///
+    /// ```
+    /// use pdv::Pdv;
+    ///
+    /// let pdv = Pdv { theta_r: 0.7, d_p: 0.3, phi_p: 1.0 };
+    /// let (incident, exitant) = pdv.directions().expect("it is on the disk");
+    /// let back = Pdv::from_directions(incident, exitant).expect("above the horizon");
+    /// assert!((back.d_p - 0.3).abs() < 1e-15 && (back.phi_p - 1.0).abs() < 1e-14);
+    /// assert!(Pdv { d_p: 1.9, ..pdv }.directions().is_none());
+    /// ```
     pub fn directions(self) -> Option<(DVec3, DVec3)> {
         let light = self.light()?;
         let (sin_o, cos_o) = self.theta_r.sin_cos();
@@ -120,6 +168,14 @@ fn cos_from_sin(sin: f64) -> f64 {
 
 /// Signed angle of the light from the normal, rad, at a signed deviation with the viewer at +θ_r in the same plane;
 /// `None` where no light can stand.
+///
+/// ```
+/// use pdv::light_angle;
+///
+/// assert_eq!(light_angle(0.6, 0.6_f64.sin()), Some(0.0), "the light stands on the normal");
+/// assert!((light_angle(0.6, 0.0).expect("the mirror direction") + 0.6).abs() < 1e-15);
+/// assert_eq!(light_angle(0.6, 1.9), None);
+/// ```
 pub fn light_angle(theta_r: f64, deviation: f64) -> Option<f64> {
     let sin = deviation - theta_r.sin();
     (sin.abs() <= RIM).then(|| sin.atan2(cos_from_sin(sin.abs())))

@@ -26,6 +26,14 @@ impl Density {
     pub const WIDTH: f64 = 0.001;
 
     /// The vector that is stored in this crate.
+    ///
+    /// ```
+    /// use pdv::Density;
+    ///
+    /// let bins = Density::stored().bins();
+    /// assert_eq!(bins.len(), Density::BINS);
+    /// assert!(bins[0] > 100.0 * bins[500], "lobes are sharp");
+    /// ```
     pub fn stored() -> &'static Self {
         &STORED
     }
@@ -51,6 +59,11 @@ impl Density {
     }
 
     /// The vector as a table: comments, a heading, then `d_p,E`.
+    ///
+    /// ```
+    /// let table = pdv::Density::stored().table();
+    /// assert!(table.lines().any(|line| line == "d_p,E"));
+    /// ```
     pub fn table(&self) -> String {
         let mut table = String::from(
             "# E of Eq. 1: reflectance of the 100 fitted MERL materials (1/sr, mean of RGB and of the materials)\n\
@@ -69,6 +82,13 @@ impl Density {
 /// φ_p = 0, 4 … 356° at d_p = `bin`·0.001, as far as both directions lie below 80°, the range of the fits.
 ///
 /// The fits are smooth in both angles, so that the paper's steps of 1° would only take eight times as long.
+///
+/// ```
+/// use pdv::{Density, mean_reflectance};
+///
+/// let stored = Density::stored().bins()[1500];
+/// assert!((mean_reflectance(1500) / stored - 1.0).abs() < 1e-6);
+/// ```
 pub fn mean_reflectance(bin: usize) -> f64 {
     let d_p = bin as f64 * Density::WIDTH;
     let limit = 80.0_f64.to_radians().cos();

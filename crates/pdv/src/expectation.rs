@@ -62,6 +62,24 @@ impl Expectation {
     ///
     /// # Errors
     /// As [`crate::Planes::from_observations`].
+    ///
+    /// ```
+    /// # use pdv::Observation;
+    /// # let gold = brdf::Fitted::named("gold-paint").expect("one of the fitted materials");
+    /// # let plane = |theta_r: f64| -> Vec<Observation> {
+    /// #     let deviations = [-0.04, 0.0, 0.02, 0.06, 0.15, 0.4, 0.8];
+    /// #     deviations.iter().filter_map(|&d| Observation::of(&gold, theta_r, d)).collect()
+    /// # };
+    /// # let arc: Vec<_> = [0.1, 0.5, 0.9, 1.3].iter().filter_map(|&t| Observation::of(&gold, t, 0.0)).collect();
+    ///
+    /// use pdv::Expectation;
+    ///
+    /// let few = Expectation::new(&[plane(0.3), plane(1.0)], &arc, None)?;
+    /// assert!(few.male > 0.0 && few.male < 0.1);
+    /// // A plane below, between and above the two.
+    /// assert_eq!(few.worth.planes.len(), 3);
+    /// # Ok::<(), pdv::Error>(())
+    /// ```
     pub fn new(
         planes: &[Vec<Observation>],
         arc: &[Observation],

@@ -32,6 +32,18 @@ impl Factor {
     ///
     /// # Errors
     /// No point is left.
+    ///
+    /// ```
+    /// use glam::DVec3;
+    /// use pdv::Factor;
+    ///
+    /// let rgb = |y: f64| DVec3::splat(y);
+    /// let factor = Factor::new("G", [(1.0, rgb(2.0)), (0.0, rgb(4.0)), (3.0, rgb(1.0)), (1.0, rgb(4.0))])?;
+    /// assert_eq!(factor.at(1.0).x, 3.0, "the mean of both values there");
+    /// assert!(factor.at(2.0).x < 3.0 && factor.at(2.0).x > 1.0, "it never leaves the range of its neighbours");
+    /// assert_eq!(factor.at(9.0).x, 1.0);
+    /// # Ok::<(), pdv::Error>(())
+    /// ```
     pub fn new(name: &'static str, points: impl IntoIterator<Item = (f64, DVec3)>) -> Result<Self, Error> {
         Self::through(name, points, true)
     }
@@ -43,6 +55,16 @@ impl Factor {
     ///
     /// # Errors
     /// No point is left.
+    ///
+    /// ```
+    /// use glam::DVec3;
+    /// use pdv::Factor;
+    ///
+    /// let factor = Factor::over_squares("F", [(0.1, DVec3::ONE), (0.3, DVec3::ZERO)])?;
+    /// assert_eq!(factor.at(0.1 * 0.1), DVec3::ONE);
+    /// assert_eq!(factor.range(), (0.1 * 0.1, 0.3 * 0.3));
+    /// # Ok::<(), pdv::Error>(())
+    /// ```
     pub fn over_squares(
         name: &'static str,
         points: impl IntoIterator<Item = (f64, DVec3)>,

@@ -18,6 +18,18 @@ pub struct Observation {
 
 impl Observation {
     /// What a perfect instrument would read on a BRDF; `None` where light or sensor cannot stand there.
+    ///
+    /// ```
+    /// use brdf::Lambert;
+    /// use pdv::Observation;
+    ///
+    /// let half = Lambert::new(0.5)?;
+    /// let reading = Observation::of(&half, 0.6, 0.1).expect("light can stand there");
+    /// assert_eq!(reading.rgb.x, 0.5 / std::f64::consts::PI);
+    /// // Outwards there is only 1 − sin θ_r.
+    /// assert!(Observation::of(&half, 0.6, -0.5).is_none());
+    /// # Ok::<(), brdf::Error>(())
+    /// ```
     pub fn of(brdf: &(impl Brdf + ?Sized), theta_r: f64, deviation: f64) -> Option<Self> {
         let (incident, exitant) = Pdv::in_plane(theta_r, deviation).directions()?;
         Some(Self {
@@ -28,6 +40,15 @@ impl Observation {
     }
 
     /// PDV coordinates, φ_p 0 or π.
+    ///
+    /// ```
+    /// use brdf::Lambert;
+    /// use pdv::Observation;
+    ///
+    /// let outwards = Observation::of(&Lambert::new(0.5)?, 0.6, -0.1).expect("light can stand there").pdv();
+    /// assert_eq!((outwards.d_p, outwards.phi_p), (0.1, std::f64::consts::PI));
+    /// # Ok::<(), brdf::Error>(())
+    /// ```
     pub fn pdv(&self) -> Pdv {
         Pdv::in_plane(self.theta_r, self.deviation)
     }

@@ -43,6 +43,26 @@ impl Planes {
     /// # Errors
     /// No usable reading of any plane, none of an arc that is not empty, or θ_r within a plane that differ by more
     /// than 0.02 rad.
+    ///
+    /// ```
+    /// # use pdv::Observation;
+    /// # let gold = brdf::Fitted::named("gold-paint").expect("one of the fitted materials");
+    /// # let plane = |theta_r: f64| -> Vec<Observation> {
+    /// #     let deviations = [-0.04, 0.0, 0.02, 0.06, 0.15, 0.4, 0.8];
+    /// #     deviations.iter().filter_map(|&d| Observation::of(&gold, theta_r, d)).collect()
+    /// # };
+    /// # let arc: Vec<_> = [0.1, 0.5, 0.9, 1.3].iter().filter_map(|&t| Observation::of(&gold, t, 0.0)).collect();
+    ///
+    /// use pdv::{Model, Planes};
+    ///
+    /// let model = Planes::from_observations(&[plane(0.3), plane(1.0)], &arc)?;
+    /// let (incident, exitant) = plane(0.3)[3].pdv().directions().expect("it was read there");
+    /// let found = model.exact(incident, exitant);
+    /// assert!((found / plane(0.3)[3].rgb - 1.0).abs().max_element() < 1e-6, "it gives back what was read");
+    /// assert!(!model.extrapolated(incident, exitant));
+    /// assert!(Planes::from_observations(&[], &arc).is_err());
+    /// # Ok::<(), pdv::Error>(())
+    /// ```
     pub fn from_observations(planes: &[Vec<Observation>], arc: &[Observation]) -> Result<Self, Error> {
         let sweeps = Sweeps::new(planes, arc)?;
         let (surface, error) = crate::choice::choose(&sweeps)?;
@@ -69,6 +89,26 @@ impl Planes {
     }
 
     /// Reflectance as [`Brdf::eval`] gives it, but by the formula and in f64, not from the table.
+    ///
+    /// ```
+    /// # use pdv::Observation;
+    /// # let gold = brdf::Fitted::named("gold-paint").expect("one of the fitted materials");
+    /// # let plane = |theta_r: f64| -> Vec<Observation> {
+    /// #     let deviations = [-0.04, 0.0, 0.02, 0.06, 0.15, 0.4, 0.8];
+    /// #     deviations.iter().filter_map(|&d| Observation::of(&gold, theta_r, d)).collect()
+    /// # };
+    /// # let arc: Vec<_> = [0.1, 0.5, 0.9, 1.3].iter().filter_map(|&t| Observation::of(&gold, t, 0.0)).collect();
+    ///
+    /// use brdf::Brdf;
+    ///
+    /// let model = pdv::Planes::from_observations(&[plane(0.3), plane(1.0)], &arc)?;
+    /// let (incident, exitant) = plane(1.0)[4].pdv().directions().expect("it was read there");
+    /// let (table, formula) = (model.eval(incident, exitant), model.exact(incident, exitant));
+    /// assert!((table / formula - 1.0).abs().max_element() < 0.1);
+    /// // Light and viewer may be swapped.
+    /// assert_eq!(formula, model.exact(exitant, incident));
+    /// # Ok::<(), pdv::Error>(())
+    /// ```
     pub fn exact(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
         self.surface.eval(incident, exitant)
     }

@@ -46,6 +46,25 @@ struct Row {
 
 impl Sampler {
     /// The sampler of a model, by the mean of its channels.
+    ///
+    /// ```
+    /// # use pdv::Observation;
+    /// # let gold = brdf::Fitted::named("gold-paint").expect("one of the fitted materials");
+    /// # let plane = |theta_r: f64| -> Vec<Observation> {
+    /// #     let deviations = [-0.04, 0.0, 0.02, 0.06, 0.15, 0.4, 0.8];
+    /// #     deviations.iter().filter_map(|&d| Observation::of(&gold, theta_r, d)).collect()
+    /// # };
+    /// # let arc: Vec<_> = [0.1, 0.5, 0.9, 1.3].iter().filter_map(|&t| Observation::of(&gold, t, 0.0)).collect();
+    ///
+    /// use pdv::{Planes, Sampler};
+    ///
+    /// let model = Planes::from_observations(&[plane(0.3), plane(1.0)], &arc)?;
+    /// let sampler = Sampler::new(&model);
+    /// let viewer = glam::DVec3::new(0.6, 0.0, 0.8);
+    /// let light = sampler.sample(viewer, [0.3, 0.7]).expect("the viewer is above the horizon");
+    /// assert!((light.pdf / sampler.pdf(light.incident, viewer) - 1.0).abs() < 1e-6);
+    /// # Ok::<(), pdv::Error>(())
+    /// ```
     pub fn new(model: &(impl Model + ?Sized)) -> Self {
         let theta_o = |n: usize| 2.0 * (n as f64 / (ROWS - 1) as f64).atan();
         Self {

@@ -54,6 +54,17 @@ impl Scene {
     }
 
     /// Whether light and viewer are looked at as they are.
+    ///
+    /// ```
+    /// use glam::DVec3;
+    /// use pdv::{Cell, Scene};
+    ///
+    /// let half = Cell { theta_i: [0.0, 0.5], theta_o: [0.0, 1.0], weight: 1.0 };
+    /// let scene = Scene { cells: vec![half], ..Scene::whole() };
+    /// let at_45_deg = DVec3::new(1.0, 0.0, 1.0).normalize();
+    /// assert!(scene.holds(DVec3::Z, at_45_deg) && !scene.holds(at_45_deg, DVec3::Z));
+    /// assert_eq!(scene.reach(), 1.0);
+    /// ```
     pub fn holds(&self, incident: DVec3, exitant: DVec3) -> bool {
         let [theta_i, theta_o] =
             [incident, exitant].map(|direction| Spherical::from_direction(direction).theta);

@@ -50,6 +50,24 @@ impl Separable {
     /// # Errors
     /// No finite reading of the plane, none of an arc that is not empty, or θ_r of the plane or d_p of the arc that
     /// differ by more than 0.02 rad or 0.05 and so belong to several sweeps.
+    ///
+    /// ```
+    /// # use pdv::Observation;
+    /// # let gold = brdf::Fitted::named("gold-paint").expect("one of the fitted materials");
+    /// # let plane = |theta_r: f64| -> Vec<Observation> {
+    /// #     let deviations = [-0.04, 0.0, 0.02, 0.06, 0.15, 0.4, 0.8];
+    /// #     deviations.iter().filter_map(|&d| Observation::of(&gold, theta_r, d)).collect()
+    /// # };
+    /// # let arc: Vec<_> = [0.1, 0.5, 0.9, 1.3].iter().filter_map(|&t| Observation::of(&gold, t, 0.0)).collect();
+    ///
+    /// use brdf::Brdf;
+    ///
+    /// let model = pdv::Separable::from_observations(&plane(0.5), &arc)?;
+    /// // F is 1 where the arc crosses the plane, so that the plane is given back.
+    /// let (incident, exitant) = plane(0.5)[4].pdv().directions().expect("it was read there");
+    /// assert!((model.eval(incident, exitant) / plane(0.5)[4].rgb - 1.0).abs().max_element() < 0.05);
+    /// # Ok::<(), pdv::Error>(())
+    /// ```
     pub fn from_observations(plane: &[Observation], arc: &[Observation]) -> Result<Self, Error> {
         let sides = Sides::new(plane)?;
         let readings = plane.iter().chain(arc).filter(|o| o.rgb.is_finite());
@@ -94,6 +112,16 @@ impl Separable {
     ///
     /// # Errors
     /// No pose exists.
+    ///
+    /// ```
+    /// use brdf::Lambert;
+    /// use pdv::Separable;
+    ///
+    /// let model = Separable::sample(&Lambert::new(0.5)?, 0.5, &[-0.2, 0.0, 0.5], &[0.2, 0.5, 1.0], 0.0)?;
+    /// assert!((model.g().at(0.0).x - (0.5 / std::f64::consts::PI).ln_1p()).abs() < 1e-15);
+    /// assert!((model.f().at(0.5_f64.sin().powi(2)).x - 1.0).abs() < 1e-12);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn sample(
         brdf: &(impl Brdf + ?Sized),
         theta_r: f64,

@@ -60,6 +60,16 @@ pub struct Spread {
 /// it is reachable, to the outermost ends. Two are nowhere closer than `spacing_rad` in the angle of the light arm:
 /// those that would be are merged and counted, so there may be fewer than asked for. Total: ranges that are empty,
 /// not finite or off the disk are ignored.
+///
+/// ```
+/// use pdv::{Distribution, spread};
+///
+/// let theta_r = 0.5_f64;
+/// let reach = theta_r.sin() - 0.99..=theta_r.sin() + 0.99;
+/// let found = spread(Distribution::Lobe, theta_r, &[reach], 20, 1.5e-3);
+/// assert_eq!((found.deviations.len(), found.merged), (20, 0));
+/// assert!(found.deviations.contains(&0.0), "the mirror direction is read");
+/// ```
 pub fn spread(
     distribution: Distribution,
     theta_r: f64,
