@@ -1,7 +1,7 @@
 //! How far an estimate of a reflectance is from a reference: the one place in which the error metrics are defined.
 //!
 //! The functions that take a reference and an estimate give the error of one value, [`Tally`] sums them over many values,
-//! and [`Metrics`] is what a tally comes to. [`crate::compare`] draws the pairs of directions and fills tallies, and
+//! and [`Metrics`] is what a tally comes to. [`crate::compare()`] draws the pairs of directions and fills tallies, and
 //! [`spheres`] compares pictures. Reflectances are in sr⁻¹ and at
 //! least 0; a tally of estimates that are not finite is not finite either.
 //!
