@@ -3,7 +3,7 @@ use std::path::{Path, PathBuf};
 use brdf::Brdf;
 use capture::{FileJournal, Reading, Record, extended_plan};
 use pdv::{Model, Observation, Separable};
-use report::{Measurement, measurements, observations};
+use report::{Measurement, Sweeps, measurements};
 use rig::RigFile;
 use sweep::{Job, Sweep};
 
@@ -62,9 +62,8 @@ impl Captured {
             panic!("the journal begins with a header");
         };
         let job = Job::parse(&header.job, "job").expect("the run's job is sound");
-        let of = |sweep| observations(&self.measurements, sweep);
-        let planes: Vec<_> = (0..job.planes.len()).map(|i| of(Sweep::Plane(i))).collect();
-        report::model(job.model, &planes, &of(Sweep::Arc)).expect("enough readings")
+        let sweeps = Sweeps::new(&job, &self.measurements);
+        sweeps.model(&job).expect("enough readings")
     }
 
     /// The separable model of a material sampled directly, without any instrument, at the run's measured angles.

@@ -3,12 +3,12 @@ use std::f64::consts::PI;
 use anyhow::Context;
 use arms::ArmAngle;
 use brdf::Brdf;
-use capture::{FileJournal, Record};
+use capture::{FileJournal, Flag, Record};
 use formats::{Export, Metadata, Reading};
-use pdv::{Model, Within};
-use report::{Measurement, Run, RunDirectory, flag_name, measurements, model, observations};
+use pdv::Model;
+use report::{Measurement, Run, RunDirectory, Sweeps, flag_name, measurements};
 use rig::RigFile;
-use sweep::{Job, Sweep};
+use sweep::Job;
 
 /// The model of a run, rebuilt from the readings in its journal, with all that an export can say of it.
 pub(crate) struct Rebuilt {
@@ -37,16 +37,9 @@ impl Rebuilt {
             directory.path().display()
         );
         let measurements = measurements(&records, &rig);
-        let planes: Vec<_> = (0..job.planes.len())
-            .map(|i| observations(&measurements, Sweep::Plane(i)))
-            .collect();
-        let whole = model(job.model, &planes, &observations(&measurements, Sweep::Arc))?;
         let detector_rad = rig.uncertainty.apertures_rad[1];
         Ok(Self {
-            model: match job.scene {
-                Some(scene) => Box::new(Within::new(whole, scene)),
-                None => whole,
-            },
+            model: Sweeps::new(&job, &measurements).model(&job)?,
             readings: measurements
                 .iter()
                 .enumerate()
@@ -82,7 +75,8 @@ fn reading(index: usize, m: &Measurement) -> Reading {
     if !m.reading.accepted {
         flags.push("repeated");
     }
-    if m.shadowed {
+    // The arms may have been aligned since the reading was flagged.
+    if m.shadowed && !m.reading.flags.contains(&Flag::Shadowed) {
         flags.push("shadowed");
     }
     Reading {

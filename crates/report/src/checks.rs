@@ -18,6 +18,8 @@ pub(crate) use energy::energy;
 pub(crate) use reflectance::reflectance;
 pub(crate) use visits::visits;
 
+/// The channels, as texts call them.
+const COLOURS: [&str; 3] = ["red", "green", "blue"];
 /// Two readings of one pose may differ by so much before somebody should look: the repeatability of a good rig.
 const REPEAT_LIMIT: f64 = 0.03;
 /// A pose that is measured again when a run goes on may differ by so many of its expanded uncertainties, and at least by so

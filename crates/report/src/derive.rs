@@ -8,16 +8,16 @@ use sweep::{Job, Sweep};
 use crate::{Measurement, observations};
 
 /// The observations that a model is made of.
-pub(crate) struct Sweeps {
+pub struct Sweeps {
     /// Of each plane of the job, in its order.
-    pub(crate) planes: Vec<Vec<Observation>>,
+    pub planes: Vec<Vec<Observation>>,
     /// Of the arc; empty where the job has none.
-    pub(crate) arc: Vec<Observation>,
+    pub arc: Vec<Observation>,
 }
 
 impl Sweeps {
     /// Sorts measurements by sweep.
-    pub(crate) fn new(job: &Job, measurements: &[Measurement]) -> Self {
+    pub fn new(job: &Job, measurements: &[Measurement]) -> Self {
         let planes = 0..job.planes.len();
         Self {
             planes: planes
@@ -31,7 +31,7 @@ impl Sweeps {
     ///
     /// # Errors
     /// Too few usable readings.
-    pub(crate) fn model(&self, job: &Job) -> Result<Box<dyn Model>, pdv::Error> {
+    pub fn model(&self, job: &Job) -> Result<Box<dyn Model>, pdv::Error> {
         let model = model(job.model, &self.planes, &self.arc)?;
         Ok(match &job.scene {
             Some(scene) => Box::new(Within::new(model, scene.clone())),

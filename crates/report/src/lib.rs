@@ -27,7 +27,7 @@ mod uncertainty;
 
 pub use adapt::{Adapted, extension};
 pub use check::{Check, Verdict};
-pub use derive::model;
+pub use derive::{Sweeps, model};
 pub use directory::RunDirectory;
 pub use error::{ReportError, is_full};
 pub use measurement::{Measurement, measurements, observations};

@@ -131,26 +131,31 @@ fn together(stays: &[usize], i: usize) -> Range<usize> {
 
 /// Every reading of a journal, in its order, also as calibrations see it.
 pub(crate) fn all_taken(records: &[Record]) -> Vec<(&Reading, Taken)> {
-    let begun = records.iter().find_map(|record| match record {
-        Record::Begin { device_ticks, .. } => Some(*device_ticks),
-        _ => None,
-    });
-    let begun = begun.unwrap_or_default();
+    let begun = begun(records);
     let readings = records.iter().filter_map(|record| match record {
         Record::Reading(reading) => Some(reading),
         _ => None,
     });
-    readings
-        .map(|reading| {
-            let taken = Taken {
-                pose: reading.measured,
-                time_s: reading.device_ticks.saturating_sub(begun) as f64 * TICK_S,
-                lamp: reading.lamp,
-                counts: reading.counts,
-            };
-            (reading, taken)
-        })
-        .collect()
+    readings.map(|reading| (reading, taken(reading, begun))).collect()
+}
+
+/// The photometer's ticks when a run began.
+pub(crate) fn begun(records: &[Record]) -> u64 {
+    let begun = records.iter().find_map(|record| match record {
+        Record::Begin { device_ticks, .. } => Some(*device_ticks),
+        _ => None,
+    });
+    begun.unwrap_or_default()
+}
+
+/// A reading as calibrations see it, of a run that began at these ticks.
+pub(crate) fn taken(reading: &Reading, begun: u64) -> Taken {
+    Taken {
+        pose: reading.measured,
+        time_s: reading.device_ticks.saturating_sub(begun) as f64 * TICK_S,
+        lamp: reading.lamp,
+        counts: reading.counts,
+    }
 }
 
 /// What a reduction is made of: dark readings of a set that was not believed are left out.

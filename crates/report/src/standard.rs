@@ -1,8 +1,6 @@
 use arms::{ArmAngle, Pose};
 use capture::Record;
-use rig::{
-    Certificate, Certified, Colour, Conditions, Filling, Gain, Patch, RigFile, Taken, Trap, White, Zero,
-};
+use rig::{Certificate, Certified, Colour, Conditions, Gain, Patch, RigFile, Taken, Trap, White, Zero};
 use serde::Deserialize;
 use sweep::{Sweep, Visit};
 
@@ -297,10 +295,7 @@ fn reflectance_factor(file: &RigFile, records: &[Record]) -> [f64; 3] {
 /// Overlapping exposures of every gain at a certified geometry, by the rig file's responsivity.
 fn ladder(file: &RigFile, at: &Certified) -> Vec<Visit> {
     let pose = file.nearest(at.pose);
-    let cosine = match file.calibration.filling {
-        Filling::Over => pose.light.rad().cos(),
-        Filling::Under => pose.sensor.rad().cos(),
-    };
+    let cosine = file.calibration.filling.arm(pose).rad().cos();
     let rates = (0..3)
         .map(|c| file.calibration.responsivity[c] * at.reflectance_factor[c] / std::f64::consts::PI * cosine);
     let brightest = rates.fold(0.0, f64::max);

@@ -1,3 +1,4 @@
+use arms::{ArmAngle, Pose};
 use serde::{Deserialize, Serialize};
 
 use crate::Gain;
@@ -39,6 +40,16 @@ pub enum Filling {
     Over,
     /// The light's spot lies within what the sensor sees: signal ~ f · cos θ_o.
     Under,
+}
+
+impl Filling {
+    /// Angle of the arm whose cosine the signal carries.
+    pub fn arm(self, pose: Pose) -> ArmAngle {
+        match self {
+            Self::Over => pose.light,
+            Self::Under => pose.sensor,
+        }
+    }
 }
 
 /// Constants between counts and sr⁻¹; `[calibration]` of the rig file. What a certificate measured goes before.

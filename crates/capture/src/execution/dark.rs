@@ -51,7 +51,7 @@ impl<R: Rig> Execution<'_, R> {
                 Err(fault) if left == 0 => return Err(Interrupt::Dark(fault)),
                 Err(fault) => tracing::warn!("{fault}; they are taken again"),
             }
-            self.pause(PAUSE).await?;
+            self.let_pass(PAUSE).await?;
         }
         Ok(())
     }
@@ -200,18 +200,6 @@ impl<R: Rig> Execution<'_, R> {
         self.mark = self.clock.last();
         self.progress.closed();
         self.report_progress();
-        Ok(())
-    }
-
-    /// Lets time pass, looking after the rig and at what the operator wants.
-    async fn pause(&mut self, mut left: Duration) -> Result<(), Interrupt<R::Error>> {
-        while !left.is_zero() {
-            self.obey().await?;
-            let slice = left.min(self.look_every());
-            self.drive.wait(slice).await?;
-            left -= slice;
-            self.mark = self.look().await?;
-        }
         Ok(())
     }
 }

@@ -15,14 +15,7 @@ impl<R: Rig> Execution<'_, R> {
         };
         self.tell_suspended(why.clone()).await?;
         loop {
-            let mut left = every;
-            while !left.is_zero() {
-                self.obey().await?;
-                let slice = left.min(self.look_every());
-                self.drive.wait(slice).await?;
-                left -= slice;
-                self.mark = self.look().await?;
-            }
+            self.let_pass(every).await?;
             match self.unfit(true).await? {
                 None => break,
                 Some(still) if still == why => {}

@@ -61,16 +61,22 @@ impl<R: Rig> Execution<'_, R> {
         }
     }
 
-    /// Waits until the lamp, which is on, gives steady light.
-    pub(super) async fn warm_up(&mut self, mut left: Duration) -> Result<(), Interrupt<R::Error>> {
-        self.state(State::WarmingUp);
+    /// Lets time pass, looking after the rig and at what the operator wants.
+    pub(super) async fn let_pass(&mut self, mut left: Duration) -> Result<(), Interrupt<R::Error>> {
         while !left.is_zero() {
             self.obey().await?;
             let slice = left.min(self.look_every());
             self.drive.wait(slice).await?;
             left -= slice;
-            self.look().await?;
+            self.mark = self.look().await?;
         }
+        Ok(())
+    }
+
+    /// Waits until the lamp, which is on, gives steady light.
+    pub(super) async fn warm_up(&mut self, time: Duration) -> Result<(), Interrupt<R::Error>> {
+        self.state(State::WarmingUp);
+        self.let_pass(time).await?;
         self.mark = self.look().await?;
         self.progress.warm();
         self.state(State::Running);

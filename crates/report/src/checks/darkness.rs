@@ -1,10 +1,10 @@
 //! Whether the dark level is the one that was subtracted.
 
-use capture::{Reading, Record};
-use rig::{Counts, Darks, Filling, RigFile, Taken};
+use capture::Record;
+use rig::{Counts, Darks, RigFile, Taken};
 use serde_json::json;
 
-use crate::measurement::{all_taken, believed, certificate};
+use crate::measurement::{all_taken, begun, believed, certificate, taken};
 use crate::{Check, Measurement, Verdict};
 
 /// By how many standard deviations a dark reading may differ from the level before.
@@ -29,9 +29,7 @@ struct Change {
 pub(crate) fn darkness(measurements: &[Measurement], records: &[Record], rig: &RigFile) -> Check {
     let name = "dark level";
     let readings = all_taken(records);
-    let begun = readings.first().map_or(0.0, |(reading, taken)| {
-        reading.device_ticks as f64 * crate::run::TICK_S - taken.time_s
-    });
+    let begun = begun(records);
     let closing: Vec<Taken> = records
         .iter()
         .filter_map(|record| match record {
@@ -81,15 +79,6 @@ pub(crate) fn darkness(measurements: &[Measurement], records: &[Record], rig: &R
         verdict,
         text,
         values: json!({ "readings_affected": wrong, "largest_change": most, "looked_at_the_end": looked }),
-    }
-}
-
-fn taken(reading: &Reading, begun_s: f64) -> Taken {
-    Taken {
-        pose: reading.measured,
-        time_s: reading.device_ticks as f64 * crate::run::TICK_S - begun_s,
-        lamp: reading.lamp,
-        counts: reading.counts,
     }
 }
 
@@ -153,9 +142,6 @@ fn exceeds(change: &Change, m: &Measurement, records: &[Record], rig: &RigFile) 
     let Some(u) = m.u else { return false };
     let white = certificate(records).and_then(|certificate| certificate.white.as_ref());
     let responsivity = white.map_or(rig.calibration.responsivity, |white| white.responsivity);
-    let cosine = match rig.calibration.filling {
-        Filling::Over => m.pose.light.rad().cos(),
-        Filling::Under => m.pose.sensor.rad().cos(),
-    };
+    let cosine = rig.calibration.filling.arm(m.pose).rad().cos();
     (0..3).any(|c| change.rate[c].abs() > u[c] * responsivity[c] * cosine)
 }

@@ -2,6 +2,7 @@ use glam::DVec3;
 use pdv::{Model, Scene, albedo};
 use serde_json::json;
 
+use super::COLOURS;
 use crate::{Check, Verdict};
 
 /// Directions of the viewer at which the albedo is looked at, degrees: as far as the table goes.
@@ -11,7 +12,6 @@ const ALBEDO_DEG: [f64; 7] = [0.0, 30.0, 60.0, 75.0, 80.0, 85.0, 89.0];
 const MOST: [f64; 2] = [1.0, 2.0];
 /// Less than this no specimen reflects: the blackest coatings have 0.0004.
 const LEAST: f64 = 1e-5;
-const COLOURS: [&str; 3] = ["red", "green", "blue"];
 
 /// Nothing reflects more than it receives, and nothing reflects nothing: the directional albedo in the directions of
 /// the viewer that the job asks for, over so many azimuths about the mirror direction; 1 is enough for a model that is

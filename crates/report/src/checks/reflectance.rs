@@ -3,6 +3,7 @@ use std::collections::BTreeMap;
 use serde_json::json;
 use sweep::{Job, Sweep};
 
+use super::COLOURS;
 use crate::{Check, Measurement, Verdict};
 
 /// Share of the lit readings of which no reflectance is known, above which the rest is no measurement of the specimen.
@@ -16,7 +17,6 @@ const NEGATIVE_LIMITS: [f64; 2] = [0.1, 0.2];
 const LIGHT_LIMIT: f64 = 0.05;
 /// So many lit readings with the same counts are no coincidence: each is a sum of thousands of electrons.
 const EQUAL_LIMIT: usize = 8;
-const COLOURS: [&str; 3] = ["red", "green", "blue"];
 
 /// What was found, and how bad it is.
 type Found = (Verdict, String);

@@ -3,11 +3,11 @@
 use arms::Pose;
 use glam::{DMat3, DVec3};
 
+use super::Taken;
 use super::certificate::{Certificate, Colour, Conditions, Patch, Trap, White, Zero};
 use super::ladder::Ladder;
 use super::lamp::Lamp;
 use super::reduction::Reduction;
-use super::{Filling, Taken};
 use crate::{RigError, RigFile};
 
 /// Patches span the colours where the determinant of their normal matrix is above this share of its trace, cubed.
@@ -79,10 +79,7 @@ impl White {
                 let Ok(rate) = straight.rate(taken) else { continue };
                 let pose = before.aligned(taken.pose);
                 let stray = before.trap.as_ref().map_or([0.0; 3], |trap| trap.at(pose));
-                let arm = match file.calibration.filling {
-                    Filling::Over => pose.light.rad(),
-                    Filling::Under => pose.sensor.rad(),
-                };
+                let arm = file.calibration.filling.arm(pose).rad();
                 let cosine = arm.cos();
                 tilt = tilt.max(arm.tan().abs());
                 for (c, u) in u_photometer.iter_mut().enumerate() {

@@ -3,7 +3,7 @@ use arms::Pose;
 use super::certificate::{Certificate, White};
 use super::lamp::{Drift, Lamp};
 use super::rate::Rate;
-use super::{Darks, Filling, MIN_COSINE, MIN_LAMP, Taken, Unusable};
+use super::{Darks, MIN_COSINE, MIN_LAMP, Taken, Unusable};
 use crate::RigFile;
 
 /// From the counts of one run to reflectance: the rig file, the certificate, the run's dark readings and its visits to
@@ -133,10 +133,7 @@ impl<'a> Reduction<'a> {
     /// If there are no exposures.
     pub fn combined(&self, exposures: &[Taken]) -> Result<Reflectance, Unusable> {
         let pose = self.aligned(exposures[0].pose);
-        let cosine = match self.file.calibration.filling {
-            Filling::Over => pose.light.rad().cos(),
-            Filling::Under => pose.sensor.rad().cos(),
-        };
+        let cosine = self.file.calibration.filling.arm(pose).rad().cos();
         if cosine.is_nan() || cosine < MIN_COSINE {
             return Err(Unusable::Grazing);
         }
