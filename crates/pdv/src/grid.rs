@@ -31,17 +31,17 @@ impl Grid {
         // One cell behind the last node for all that lies beyond.
         let count = nodes.iter().map(cell_of).max().unwrap_or_default() + 2;
         let mut cells = vec![0_u16; count];
-        let mut crowded = false;
-        for node in nodes.iter().map(cell_of) {
-            // The cell behind the node's begins one interval later; what is behind it follows below.
-            cells[node + 1] = cells[node + 1].saturating_add(1);
-            crowded |= cells[node + 1] > 1;
-        }
-        for n in 1..count {
+        let mut crowded = ends.len() > usize::from(u16::MAX);
+        // A cell begins in the interval behind the last node that lies in a cell before it. Filled in stretches: a
+        // sum carried from cell to cell was half of what a capture's judgement cost.
+        let mut filled = 0;
+        for (interval, node) in nodes.iter().map(cell_of).enumerate() {
+            crowded |= interval > 0 && filled == node + 1;
             // More nodes than a cell can number are left to the search.
-            cells[n] = cells[n].saturating_add(cells[n - 1]);
+            cells[filled..=node].fill(u16::try_from(interval).unwrap_or(u16::MAX));
+            filled = node + 1;
         }
-        crowded |= ends.len() > usize::from(u16::MAX);
+        cells[filled..].fill(u16::try_from(nodes.len()).unwrap_or(u16::MAX));
         Self {
             cells,
             begins: std::iter::once(0.0).chain(nodes.iter().copied()).collect(),
