@@ -87,7 +87,10 @@ fn latched(before: &[&Mark], all: &[Mark]) -> Option<FaultId> {
         What::Asked {
             op: Op::Acknowledge,
             fault: Some(named),
-        } => !refused(all, mark.number) && press(all, named).is_some_and(|number| number >= pressed),
+        } => {
+            !refused(all, mark.number)
+                && press(all, named, mark.number).is_some_and(|number| number >= pressed)
+        }
         _ => false,
     });
     (!acknowledged).then(|| fault.clone())
@@ -99,15 +102,26 @@ fn refused(all: &[Mark], number: usize) -> bool {
         .any(|mark| mark.number == number && matches!(mark.what, What::Refused))
 }
 
-/// Which press latched a fault.
-fn press(all: &[Mark], named: &FaultId) -> Option<usize> {
-    all.iter().find_map(|mark| match &mark.what {
-        What::Answered {
-            op: Op::Estop,
-            fault: Some(fault),
-        } if fault == named => Some(mark.number),
-        _ => None,
-    })
+/// Which press latched a fault that was named later. One whose answer a kill swallowed has latched all the same, and is
+/// the last that was not answered.
+fn press(all: &[Mark], named: &FaultId, by: usize) -> Option<usize> {
+    let answered = |of: Option<usize>| {
+        all.iter().find_map(|mark| match &mark.what {
+            What::Answered {
+                op: Op::Estop,
+                fault: Some(fault),
+            } if of.map_or(fault == named, |number| number == mark.number) => Some(mark.number),
+            _ => None,
+        })
+    };
+    let swallowed = || {
+        let asked = all.iter().rev().filter_map(|mark| match mark.what {
+            What::Asked { op: Op::Estop, .. } if mark.number < by => Some(mark.number),
+            _ => None,
+        });
+        asked.into_iter().find(|&number| answered(Some(number)).is_none())
+    };
+    answered(None).or_else(swallowed)
 }
 
 /// Whether somebody asked for a motion, and was answered no stop since.
