@@ -16,12 +16,14 @@ use crate::photodiodes::{Exposed, Light, Photodiodes};
 use crate::photometer::{Integration, Photometer};
 use crate::room::Room;
 use crate::servo::{Model, Servo};
-use crate::{Clock, Device, Fault, Mishap, Settings, SimError, baud, photometer, servo};
+use crate::{Clock, Device, Fault, Mechanics, Mishap, Settings, SimError, baud, photometer, servo};
 
 /// Stream of random numbers for what is drawn once; readings use the streams 0, 1, …
 const ONCE: u64 = u64::MAX;
 /// Longest stretch of a quadrature while an arm moves, s: 0.06° at 60°/s, well below an aperture.
 const PANEL_S: f64 = 1e-3;
+/// The same where arms only tremble, at 50 Hz at most.
+const TREMBLING_PANEL_S: f64 = 5e-3;
 /// Gauss–Legendre nodes and weights on −1 … 1, exact to degree 5.
 const GAUSS: [(f64, f64); 3] = [
     (-0.774_596_669_241_483_4, 5.0 / 9.0),
@@ -203,6 +205,13 @@ impl Bench {
         self.advance_to(self.now);
     }
 
+    /// Gives light and sensor servo other friction, gears, load or encoders from now on.
+    pub fn set_mechanics(&mut self, mechanics: [Mechanics; 2]) {
+        for (servo, mechanics) in self.servos.iter_mut().zip(mechanics) {
+            servo.set_mechanics(mechanics);
+        }
+    }
+
     /// Changes how often mishaps happen from now on, per hour; those that are not named do not happen any more.
     ///
     /// # Errors
@@ -277,7 +286,10 @@ impl Bench {
                 if light.rests(from, to) && sensor.rests(from, to) {
                     return self.optics.signal(self.pose_at(from)) * lamp.integral(from, to);
                 }
-                let panels = ((to - from) / PANEL_S).ceil();
+                let led = [light, sensor]
+                    .into_iter()
+                    .any(|servo| !servo.leads_nowhere(from, to));
+                let panels = ((to - from) / if led { PANEL_S } else { TREMBLING_PANEL_S }).ceil();
                 let half = (to - from) / panels / 2.0;
                 let middles = (0..panels as usize).map(|panel| from + half * (2 * panel + 1) as f64);
                 let nodes =
@@ -336,6 +348,9 @@ fn fitting(rig: &RigFile, settings: &Settings, arm: Arm, baud_code: u8) -> Resul
         start: file.axis.counts(settings.start.angle(arm)).round(),
         backlash: backlash_deg.to_radians() / file.axis.resolution_rad(),
         lag: settings.imperfections.following_lag,
+        axis: file.axis,
+        mechanics: settings.mechanics[arm as usize],
+        seed: settings.seed ^ (arm as u64) << 32,
         boot: settings.boot,
         ambient_c: settings.ambient_c,
     })

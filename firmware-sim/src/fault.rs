@@ -3,6 +3,8 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use crate::MechanicsKeys;
+
 /// Something that goes wrong with a device at a given moment of simulated time.
 ///
 /// In TOML `{ device = "sensor", at_s = 3.5, what = { stall_s = 0.2 } }`; without `at_s` at once.
@@ -56,6 +58,11 @@ pub enum Disturbance {
     Door(Duration),
     /// The device answers under this id from now on, as one that was set up wrongly.
     Id(u8),
+    /// Friction, gears, load or encoder of a servo become others from now on.
+    Mechanics(MechanicsKeys),
+    /// Somebody turns the arm of a servo that has no torque by so many degrees.
+    #[serde(rename = "turn_deg")]
+    Turn(f64),
 }
 
 /// Light that reaches the photometer whether the lamp is on or not, for a while. The lamp monitor does not see it.
@@ -82,6 +89,16 @@ impl RoomLight {
 
 fn level<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
     within(from, "per_sr", RoomLight::MAX_PER_SR)
+}
+
+fn turn<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    let deg = f64::deserialize(from)?;
+    match (-180.0..=180.0).contains(&deg) {
+        true => Ok(deg),
+        false => Err(serde::de::Error::custom(format!(
+            "turn_deg is {deg}, allowed: -180 … 180"
+        ))),
+    }
 }
 
 fn flicker<'de, D: serde::Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
@@ -134,6 +151,9 @@ enum Spelling {
     #[serde(rename = "door_s", with = "seconds")]
     Door(Duration),
     Id(u8),
+    Mechanics(MechanicsKeys),
+    #[serde(rename = "turn_deg", deserialize_with = "turn")]
+    Turn(f64),
 }
 
 impl From<Spelling> for Disturbance {
@@ -154,6 +174,8 @@ impl From<Spelling> for Disturbance {
             Spelling::RoomLight(light) => Self::RoomLight(light),
             Spelling::Door(time) => Self::Door(time),
             Spelling::Id(id) => Self::Id(id),
+            Spelling::Mechanics(keys) => Self::Mechanics(keys),
+            Spelling::Turn(deg) => Self::Turn(deg),
         }
     }
 }

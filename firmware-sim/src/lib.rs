@@ -4,6 +4,7 @@
 //! client, and `in_process`, the same bench as a `rig::Rig` over tokio time. Neither door is simulated in
 //! terms of the other.
 
+mod amount;
 mod baud;
 mod bench;
 mod device;
@@ -12,6 +13,7 @@ mod fault;
 mod imperfections;
 pub mod in_process;
 mod lamp;
+mod mechanics;
 mod mishaps;
 mod node;
 mod optics;
@@ -25,11 +27,13 @@ mod settings;
 mod table;
 mod wire;
 
+pub use amount::UpTo;
 pub use bench::Bench;
 pub use device::{Device, Refusal};
 pub use error::SimError;
 pub use fault::{Disturbance, Fault, RoomLight};
 pub use imperfections::Imperfections;
+pub use mechanics::{Creep, EncoderError, Hunting, Mechanics, MechanicsKeys, Ring};
 pub use mishaps::Mishap;
 pub use orders::Order;
 pub use program::main;

@@ -1,13 +1,14 @@
 use rig::RigFile;
 use serde::Deserialize;
 
-use crate::{Fault, Server, SimError, WireSettings};
+use crate::{Fault, Server, Settings, SimError, WireSettings};
 
 /// What a running simulator is told to do: a line of TOML, as `firmware-sim --orders` reads them from stdin.
 ///
 /// Keys are those of the `[sim]` table that may change while it runs; a table keeps what the line does not name.
 /// `fault = { device = "sensor", what = "overload" }` happens at once, or at its `at_s`; `plugged = false` pulls the
-/// adapter's plug, `plugged = true` puts it in again, perhaps under another name.
+/// adapter's plug, `plugged = true` puts it in again, perhaps under another name. `sim.jitter_counts = 2` and
+/// `sim.light.static_error_counts = 5` change the mechanics of both arms, or of one.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Order {
@@ -15,6 +16,7 @@ pub struct Order {
     wire: toml::Table,
     mishaps: toml::Table,
     plugged: Option<bool>,
+    sim: toml::Table,
 }
 
 impl std::str::FromStr for Order {
@@ -34,13 +36,20 @@ impl Order {
     /// A value that is not allowed, and nothing is changed; no pseudo-terminal to be had.
     pub fn carry_out(self, rig: &mut RigFile, server: &mut Server) -> Result<(), SimError> {
         let mut changed = rig.clone();
-        merge(&mut changed.sim, "wire", self.wire);
-        merge(&mut changed.sim, "mishaps", self.mishaps);
+        merge(&mut changed.sim, table("wire", self.wire));
+        merge(&mut changed.sim, table("mishaps", self.mishaps));
+        merge(&mut changed.sim, self.sim);
         let wire = WireSettings::new(&changed)?;
-        let mishaps = crate::Settings::new(&changed)?.mishaps;
+        let settings = Settings::new(&changed)?;
+        let before = Settings::new(rig)?;
+        only_what_may_change(&settings, &before)?;
+        let mishaps = settings.mishaps;
         let same = changed.sim.get("mishaps") == rig.sim.get("mishaps");
         if !same {
             server.bench(|bench| bench.set_mishaps(mishaps))?;
+        }
+        if settings.mechanics != before.mechanics {
+            server.bench(|bench| bench.set_mechanics(settings.mechanics));
         }
         server.faults(|faults| *faults = wire.faults);
         *rig = changed;
@@ -58,11 +67,39 @@ impl Order {
     }
 }
 
-fn merge(sim: &mut toml::Table, name: &str, keys: toml::Table) {
-    let table = sim.entry(name).or_insert_with(|| toml::Table::new().into());
-    if let Some(table) = table.as_table_mut() {
-        table.extend(keys);
+/// A table with one table in it.
+fn table(name: &str, keys: toml::Table) -> toml::Table {
+    toml::Table::from_iter([(name.to_owned(), keys.into())])
+}
+
+/// Sets keys, and in tables within only those that are named.
+fn merge(into: &mut toml::Table, keys: toml::Table) {
+    for (key, value) in keys {
+        match (into.get_mut(&key), value) {
+            (Some(toml::Value::Table(old)), toml::Value::Table(new)) => merge(old, new),
+            (_, value) => {
+                into.insert(key, value);
+            }
+        }
     }
+}
+
+/// Whether two states of the `[sim]` table differ in what a bench that runs can take on.
+fn only_what_may_change(changed: &Settings, before: &Settings) -> Result<(), SimError> {
+    let rest = |settings: &Settings| Settings {
+        mechanics: before.mechanics,
+        mishaps: before.mishaps.clone(),
+        ..settings.clone()
+    };
+    if rest(changed) == rest(before) {
+        return Ok(());
+    }
+    Err(SimError::Form {
+        why:
+            "only the mechanics of the arms can change while the simulator runs, such as sim.jitter_counts; \
+              everything else holds from power-on, so change the rig file and start it again"
+                .to_owned(),
+    })
 }
 
 #[cfg(test)]
@@ -106,6 +143,31 @@ mod tests {
     }
 
     #[test]
+    fn the_mechanics_of_one_arm_change_while_it_runs() {
+        let mut rig = RigFile::default();
+        let mut server = Server::start(&rig).unwrap();
+        obey("sim.light.gravity_counts = 8", &mut rig, &mut server).unwrap();
+        let order = "sim = { light = { sag_deg_per_s = 30 }, sensor = { sag_deg_per_s = 5 } }";
+        obey(order, &mut rig, &mut server).unwrap();
+        let settings = Settings::new(&rig).unwrap();
+        assert_eq!(
+            settings.mechanics[0].gravity_counts, 8.0,
+            "what is not named stays"
+        );
+        let before = server.bench(|bench| bench.pose());
+        server.bench(|bench| bench.advance_to(bench.now() + std::time::Duration::from_secs(1)));
+        let after = server.bench(|bench| bench.pose());
+        assert!(
+            (after.light.deg() - before.light.deg() + 30.0).abs() < 0.1,
+            "{after:?}"
+        );
+        assert!(
+            (after.sensor.deg() - before.sensor.deg() - 5.0).abs() < 0.1,
+            "{after:?}"
+        );
+    }
+
+    #[test]
     fn a_fault_without_a_time_happens_at_once() {
         let mut rig = RigFile::default();
         let mut server = Server::start(&rig).unwrap();
@@ -143,6 +205,12 @@ mod tests {
             "fault = { device = 'sensor', at_s = -1, what = 'reboot' }",
             "fault = { device = 'sensor', what = 'tired' }",
             "unplug",
+            "sim.jitter_counts = -1",
+            "sim.jitter_counts = nan",
+            "sim.light.ring = { counts = 20 }",
+            "sim.seed = 7",
+            "fault = { device = 'light', what = { mechanics = { stiction_counts = 101 } } }",
+            "fault = { device = 'light', what = { turn_deg = 181 } }",
         ] {
             assert!(obey(line, &mut rig, &mut server).is_err(), "{line}");
         }

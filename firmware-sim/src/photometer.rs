@@ -180,7 +180,7 @@ impl Photometer {
             }
             Disturbance::Id(id) => self.node.rename(id),
             // A servo's.
-            Disturbance::Sag(_) => {}
+            Disturbance::Sag(_) | Disturbance::Mechanics(_) | Disturbance::Turn(_) => {}
         }
     }
 

@@ -5,17 +5,19 @@ mod path;
 mod registers;
 #[cfg(test)]
 mod tests;
+mod tremble;
 
 use std::time::Duration;
 
 pub(crate) use model::Model;
 use path::Path;
 use registers as reg;
+use rig::Axis;
 
-use crate::Device;
 use crate::fault::Disturbance;
 use crate::node::Node;
 use crate::table::Table;
+use crate::{Device, Mechanics};
 
 /// Firmware that the simulated servos claim: the table with time-based profile, Clear and startup configuration.
 const FIRMWARE_VERSION: u8 = 46;
@@ -35,8 +37,12 @@ pub(crate) struct Fitting {
     pub(crate) start: f64,
     /// Play between the encoder and the arm, counts.
     pub(crate) backlash: f64,
-    /// By how much the shaft follows its profile late.
+    /// By how much the shaft follows its profile late, at the factory's position gain.
     pub(crate) lag: Duration,
+    /// From servo counts to the arm's angle.
+    pub(crate) axis: Axis,
+    pub(crate) mechanics: Mechanics,
+    pub(crate) seed: u64,
     pub(crate) boot: Duration,
     pub(crate) ambient_c: f64,
 }
@@ -44,7 +50,7 @@ pub(crate) struct Fitting {
 /// An X-series servo: its control table and the motion behind it.
 ///
 /// It moves in the position modes (3, 4, 5). The modes for wheels and torque can be set, so that a host can be seen
-/// to refuse them, and hold the shaft still. Gains are kept without effect; backup and restore do not exist.
+/// to refuse them, and hold the shaft still. Of the gains P and I have an effect; backup and restore do not exist.
 ///
 /// Motion happens in shaft counts: where the shaft is, on a line that goes on over many turns. Position registers
 /// show that line with direction, lost turns and homing offset.
@@ -60,6 +66,9 @@ pub(crate) struct Servo {
     shaft: Path,
     /// What the register does not know of the shaft's turns, counts.
     lost_turns: f64,
+    mechanics: Mechanics,
+    /// Where in its tremble the shaft is at power-on, s.
+    phase_s: f64,
     sags_until: Duration,
     stalled_until: Option<Duration>,
 }
@@ -75,6 +84,8 @@ impl Servo {
             profile: Path::resting(fitting.start, 0.0),
             shaft: Path::resting(fitting.start, fitting.backlash / 2.0),
             node: Node::new(table, fitting.id, fitting.baud_code),
+            mechanics: fitting.mechanics,
+            phase_s: f64::from(fitting.id) + (fitting.seed % 1000) as f64,
             fitting,
             profile_type: 0,
             lost_turns: 0.0,
@@ -85,9 +96,11 @@ impl Servo {
         servo
     }
 
-    /// Servo count, not whole, at which the arm behind the play is.
+    /// Servo count, not whole, at which the arm behind the play really is, whatever the encoder shows.
     pub(crate) fn arm(&self, t_s: f64) -> f64 {
-        self.shaft.follower(t_s)
+        let (off, _) = self.off(t_s);
+        let shown = self.shaft.at(t_s).0 + off;
+        self.shaft.follower(t_s) + off - self.encoder_error(shown)
     }
 
     /// Moments within a stretch of time at which the motion changes its law.
@@ -97,6 +110,11 @@ impl Servo {
 
     /// Whether the shaft stands still for a stretch of time.
     pub(crate) fn rests(&self, from_s: f64, to_s: f64) -> bool {
+        self.leads_nowhere(from_s, to_s) && !self.trembles(from_s)
+    }
+
+    /// Whether the shaft is led nowhere in a stretch of time, though it may tremble.
+    pub(crate) fn leads_nowhere(&self, from_s: f64, to_s: f64) -> bool {
         self.shaft.rests(from_s, to_s)
     }
 
@@ -169,12 +187,22 @@ impl Servo {
             Disturbance::WatchdogTrip => self.trip(),
             Disturbance::Sag(duration) => self.sags_until = self.node.now + duration,
             Disturbance::Id(id) => self.node.rename(id),
+            Disturbance::Mechanics(keys) => self.set_mechanics(keys.over(self.mechanics)),
+            Disturbance::Turn(deg) => self.turn(deg),
             // The photometer's.
             Disturbance::RefusedTrigger
             | Disturbance::LostAcknowledgement
             | Disturbance::Glare(_)
             | Disturbance::RoomLight(_)
             | Disturbance::Door(_) => {}
+        }
+    }
+
+    /// Friction, gears, load or encoder become others.
+    pub(crate) fn set_mechanics(&mut self, mechanics: Mechanics) {
+        self.mechanics = mechanics;
+        if !self.torque() {
+            self.stand();
         }
     }
 

@@ -8,7 +8,7 @@ use rig::RigFile;
 use serde::Deserialize;
 
 use crate::mishaps::Rates;
-use crate::{Fault, Imperfections, Mishap, SimError};
+use crate::{Fault, Imperfections, Mechanics, MechanicsKeys, Mishap, SimError, UpTo, mechanics};
 
 /// How a simulated bench behind the wire keeps time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -31,6 +31,8 @@ pub struct Settings {
     pub clock: Clock,
     /// By how much the bench is not ideal.
     pub imperfections: Imperfections,
+    /// How light and sensor servo depart from ideal ones.
+    pub mechanics: [Mechanics; 2],
     /// How long a device is deaf after a reboot.
     pub boot: Duration,
     /// Where the arms stand when power comes on.
@@ -92,6 +94,20 @@ struct Raw {
     lamp_trend_per_h: Option<f64>,
     light_zero_deg: Option<f64>,
     sensor_zero_deg: Option<f64>,
+    static_error_counts: Option<UpTo<100>>,
+    stiction_counts: Option<UpTo<100>>,
+    creep: Option<mechanics::Creep>,
+    hunting: Option<mechanics::Hunting>,
+    jitter_counts: Option<UpTo<50>>,
+    ring: Option<mechanics::Ring>,
+    gravity_counts: Option<UpTo<500>>,
+    sag_deg_per_s: Option<UpTo<90>>,
+    encoder_error: Option<mechanics::EncoderError>,
+    encoder_noise_deg: Option<UpTo<5>>,
+    #[serde(default)]
+    light: MechanicsKeys,
+    #[serde(default)]
+    sensor: MechanicsKeys,
 }
 
 impl Settings {
@@ -124,6 +140,7 @@ impl Settings {
             boot: ms("boot_ms", raw.boot_ms, Duration::from_millis(500), 10_000.0)?,
             ambient_c: within("ambient_c", raw.ambient_c, 23.0, 0.0..=60.0)?,
             imperfections: imperfections(&raw)?,
+            mechanics: mechanics(&raw),
             clock: raw.clock.unwrap_or(Clock::Wire),
             specimen: raw.specimen.unwrap_or_else(|| "gold-paint".to_owned()),
             start,
@@ -137,6 +154,27 @@ impl Settings {
 pub(crate) fn read<T: serde::de::DeserializeOwned>(table: &toml::Table) -> Result<T, String> {
     // Its lines are not those of the file, and are not told.
     config::parse(&table.to_string()).map_err(|flaws| flaws.to_string())
+}
+
+/// What holds for both arms, and what each arm's own table makes of it.
+fn mechanics(raw: &Raw) -> [Mechanics; 2] {
+    let base = match raw.imperfections {
+        None | Some(Preset::Default) => Mechanics::DEFAULT,
+        Some(Preset::None) => Mechanics::NONE,
+    };
+    let both = MechanicsKeys {
+        static_error_counts: raw.static_error_counts,
+        stiction_counts: raw.stiction_counts,
+        creep: raw.creep,
+        hunting: raw.hunting,
+        jitter_counts: raw.jitter_counts,
+        ring: raw.ring,
+        gravity_counts: raw.gravity_counts,
+        sag_deg_per_s: raw.sag_deg_per_s,
+        encoder_error: raw.encoder_error,
+        encoder_noise_deg: raw.encoder_noise_deg,
+    };
+    [raw.light, raw.sensor].map(|own| own.over(both.over(base)))
 }
 
 fn imperfections(raw: &Raw) -> Result<Imperfections, SimError> {
@@ -256,6 +294,22 @@ mod tests {
             ..Imperfections::NONE
         };
         assert_eq!(some.imperfections, expected);
+    }
+
+    #[test]
+    fn an_arm_s_own_table_wins_over_what_holds_for_both() {
+        let of = settings("[sim]\njitter_counts = 2\nstiction_counts = 3\n[sim.sensor]\njitter_counts = 0")
+            .unwrap();
+        let [light, sensor] = of.mechanics;
+        assert_eq!([light.jitter_counts, sensor.jitter_counts], [2.0, 0.0]);
+        assert_eq!([light.stiction_counts, sensor.stiction_counts], [3.0, 3.0]);
+        for bad in [
+            "jitter_counts = -1",
+            "gravity_counts = nan",
+            "[sim.light]\nhunting = { counts = 2, hz = 51 }",
+        ] {
+            assert!(error(bad).contains("not allowed"), "{bad}: {}", error(bad));
+        }
     }
 
     #[test]

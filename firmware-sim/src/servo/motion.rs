@@ -18,6 +18,8 @@ const FOLLOWING_ERROR: f64 = 50.0;
 /// Present Current while holding, while moving, units of 2.69 mA.
 const HOLDING_CURRENT: i64 = 4;
 const MOVING_CURRENT: i64 = 60;
+/// Below this speed a shaft counts as held, counts/s.
+const HOLDING_SPEED: f64 = 1.0;
 /// Full PWM.
 const PWM: f64 = 885.0;
 /// Supply, 0.1 V.
@@ -78,14 +80,20 @@ impl Servo {
     }
 
     fn present(&self) -> i64 {
-        self.shown(self.shaft.at(self.node.now.as_secs_f64()).0)
+        let now_s = self.node.now.as_secs_f64();
+        self.shown(self.shaft.at(now_s).0 + self.off(now_s).0 + self.encoder_noise())
+    }
+
+    /// Speed of the shaft, counts/s.
+    fn speed(&self, t_s: f64) -> f64 {
+        self.shaft.at(t_s).1 + self.off(t_s).1
     }
 
     /// Whether a profile is under way or the shaft turns faster than the threshold.
     pub(super) fn moves(&self) -> bool {
         let now_s = self.node.now.as_secs_f64();
         let threshold = self.node.table.get(reg::MOVING_THRESHOLD) as f64 * VELOCITY;
-        now_s < self.profile.end_s() || self.shaft.at(now_s).1.abs() > threshold
+        now_s < self.profile.end_s() || self.speed(now_s).abs() > threshold
     }
 
     /// Stops at once where the shaft is, which becomes the goal.
@@ -95,6 +103,9 @@ impl Servo {
         self.shaft.jump(now_s, position);
         self.profile.jump(now_s, position);
         self.node.table.set(reg::GOAL_POSITION, self.present());
+        if let Some([lowest, per_s]) = self.falls(position) {
+            self.shaft.go(now_s, lowest, even(per_s));
+        }
     }
 
     /// Sets off towards Goal Position, from the velocity that the profile has now.
@@ -116,15 +127,40 @@ impl Servo {
             None => {
                 self.profile_type = 0;
                 self.profile.jump(now_s, goal);
-                Profile {
-                    velocity_rad_s: limit,
-                    acceleration_rad_s2: f64::INFINITY,
-                }
+                even(limit)
             }
         };
         if self.stalled_until.is_none() {
-            let start_s = (self.node.now + self.fitting.lag).as_secs_f64();
-            self.shaft.go(start_s, goal, shaft_profile);
+            self.lead(now_s + self.lag_s(), goal, shaft_profile);
+        }
+    }
+
+    /// Leads the shaft towards a goal from a moment on, as far as friction lets it come.
+    fn lead(&mut self, start_s: f64, goal: f64, profile: Profile) {
+        let (from, velocity) = self.shaft.at(start_s);
+        let [static_error, stiction] = self.short();
+        let way = goal - from;
+        let at_rest = velocity == 0.0;
+        if at_rest && stiction > 0.0 && way.abs() <= 2.0 * stiction {
+            self.shaft.jump(start_s, from);
+            return;
+        }
+        let short = (static_error + stiction).min(way.abs());
+        let stop = goal - short.copysign(way);
+        if at_rest && stop == from {
+            self.shaft.jump(start_s, from);
+            return;
+        }
+        match self.creep() {
+            Some([counts, per_s]) if counts < (stop - from).abs() => {
+                self.shaft.go(start_s, stop - counts.copysign(way), profile);
+                self.shaft.go(self.shaft.end_s(), stop, even(per_s));
+            }
+            _ => self.shaft.go(start_s, stop, profile),
+        }
+        let rate = self.integral_rate(short);
+        if rate > 0.0 {
+            self.shaft.go(self.shaft.end_s(), goal, even(rate));
         }
     }
 
@@ -173,15 +209,16 @@ impl Servo {
     pub(super) fn live(&self) -> Table {
         let mut table = self.node.table.clone();
         let now_s = self.node.now.as_secs_f64();
-        let (shaft, velocity) = self.shaft.at(now_s);
+        let (shaft, velocity) = (self.shaft.at(now_s).0, self.speed(now_s));
         let (planned, planned_velocity) = self.profile.at(now_s);
         let present = self.present();
         let behind = (planned - shaft).abs() > FOLLOWING_ERROR;
         let speed = |counts: f64| (self.direction() * counts / VELOCITY).round() as i64;
+        let holds = velocity.abs() < HOLDING_SPEED;
         let current = match (self.torque(), behind && self.stalled_until.is_some()) {
             (false, _) => 0,
             (true, true) => table.get(reg::CURRENT_LIMIT) * speed(planned - shaft).signum(),
-            (true, false) if velocity == 0.0 => HOLDING_CURRENT,
+            (true, false) if holds => HOLDING_CURRENT,
             (true, false) => MOVING_CURRENT * speed(velocity).signum(),
         };
         let limit = (table.get(reg::VELOCITY_LIMIT) as f64 * VELOCITY).max(1.0);
@@ -216,5 +253,13 @@ impl Servo {
             | u8::from(ongoing) << 1
             | u8::from(behind) << 3
             | if ongoing { self.profile_type << 4 } else { 0 }
+    }
+}
+
+/// A motion at one speed, counts/s, from its first moment to its last.
+fn even(counts_per_s: f64) -> Profile {
+    Profile {
+        velocity_rad_s: counts_per_s,
+        acceleration_rad_s2: f64::INFINITY,
     }
 }

@@ -73,6 +73,13 @@ impl Path {
         dragged(follower, leg.trajectory.at(t).0)
     }
 
+    /// Seconds since the last motion ended and how far it led, counts; `None` while it goes on.
+    pub(super) fn since_motion(&self, t_s: f64) -> Option<(f64, f64)> {
+        let leg = self.leg(t_s);
+        let since_s = t_s - leg.start_s - leg.trajectory.duration_s();
+        (since_s >= 0.0).then(|| (since_s, leg.trajectory.goal() - leg.trajectory.at(0.0).0))
+    }
+
     /// When the last motion ends.
     pub(super) fn end_s(&self) -> f64 {
         let leg = &self.legs[self.legs.len() - 1];

@@ -40,6 +40,8 @@ pub(super) const LED: Register = Register::new(65, 1, Ram, 0, (0, 1));
 pub(super) const STATUS_RETURN_LEVEL: Register = Register::new(68, 1, Ram, 2, (0, 2));
 pub(super) const REGISTERED_INSTRUCTION: Register = Register::new(69, 1, Read, 0, (0, 1));
 pub(super) const HARDWARE_ERROR: Register = Register::new(70, 1, Read, 0, (0, 255));
+pub(super) const POSITION_I_GAIN: Register = Register::new(82, 2, Ram, 0, GAIN);
+pub(super) const POSITION_P_GAIN: Register = Register::new(84, 2, Ram, 800, GAIN);
 pub(super) const BUS_WATCHDOG: Register = Register::new(98, 1, Ram, 0, (0, 127));
 pub(super) const GOAL_PWM: Register = Register::new(100, 2, Ram, 885, (-885, 885));
 pub(super) const GOAL_CURRENT: Register = Register::new(102, 2, Ram, 0, (-2047, 2047));
@@ -92,12 +94,11 @@ const COMMON: [Register; 53] = [
     STATUS_RETURN_LEVEL,
     REGISTERED_INSTRUCTION,
     HARDWARE_ERROR,
-    // Gains: kept, without effect on the ideal controller behind them.
     Register::new(76, 2, Ram, 1920, GAIN),
     Register::new(78, 2, Ram, 100, GAIN),
     Register::new(80, 2, Ram, 0, GAIN),
-    Register::new(82, 2, Ram, 0, GAIN),
-    Register::new(84, 2, Ram, 800, GAIN),
+    POSITION_I_GAIN,
+    POSITION_P_GAIN,
     Register::new(88, 2, Ram, 0, GAIN),
     Register::new(90, 2, Ram, 0, GAIN),
     BUS_WATCHDOG,

@@ -592,3 +592,169 @@ proptest! {
         prop_assert_eq!(run(Some(Duration::from_micros(step_us))), run(None));
     }
 }
+
+/// A bench of arms with certain mechanics, its light arm sent from −45° on by a number of counts, and what is shown and
+/// true a while later: counts off the goal.
+fn ends(sim: &str, by: i64, after_s: f64) -> (f64, f64) {
+    let mut bench = bench(sim);
+    go(&mut bench, 40, 40, 1536 + by);
+    bench.advance_to(s(after_s));
+    let shown = read(&mut bench, 132, 4) - 1536 - by;
+    let true_counts = (bench.pose().light.deg() + 45.0) * 4096.0 / 360.0 - by as f64;
+    (shown as f64, true_counts)
+}
+
+#[test]
+fn friction_stops_a_shaft_short_on_the_side_from_which_it_came() {
+    assert_eq!(ends("static_error_counts = 5", 200, 9.0).0, -5.0);
+    assert_eq!(ends("static_error_counts = 5", -200, 9.0).0, 5.0);
+    assert_eq!(ends("[sim.light]\nstatic_error_counts = 5", -200, 9.0).0, 5.0);
+    assert_eq!(ends("[sim.sensor]\nstatic_error_counts = 5", -200, 9.0).0, 0.0);
+    // A goal nearer than what friction leaves moves nothing.
+    assert_eq!(ends("static_error_counts = 5", 4, 9.0).0, -4.0);
+}
+
+#[test]
+fn a_goal_moved_by_the_error_mends_a_static_error_and_not_stiction() {
+    for (sim, first, trimmed) in [
+        ("static_error_counts = 3", -3, 0),
+        ("stiction_counts = 3", -3, -3),
+    ] {
+        let mut bench = bench(sim);
+        go(&mut bench, 40, 40, 1736);
+        bench.advance_to(s(9.0));
+        assert_eq!(read(&mut bench, 132, 4) - 1736, first, "{sim}");
+        write(&mut bench, 116, 4, 1736 - first).unwrap();
+        bench.advance_to(s(18.0));
+        assert_eq!(read(&mut bench, 132, 4) - 1736, trimmed, "{sim}");
+    }
+}
+
+#[test]
+fn gains_rule_what_friction_leaves_and_how_late_a_shaft_is() {
+    let after = |p: i64, i: i64, at_s: f64| {
+        let mut bench = bench("static_error_counts = 6\nfollowing_lag_ms = 40");
+        write(&mut bench, 84, 2, p).unwrap();
+        write(&mut bench, 82, 2, i).unwrap();
+        go(&mut bench, 40, 0, 1736);
+        bench.advance_to(s(at_s));
+        read(&mut bench, 132, 4) - 1736
+    };
+    assert_eq!(
+        [after(800, 0, 9.0), after(1600, 0, 9.0), after(400, 0, 9.0)],
+        [-6, -3, -12]
+    );
+    assert_eq!(after(800, 200, 60.0), 0, "the integral takes it away");
+    // 40 · 0.229 rpm are 625 counts/s: 25 counts in 40 ms.
+    assert_eq!(after(800, 0, 0.2) - after(1600, 0, 0.2), -13);
+}
+
+#[test]
+fn a_ring_dies_out_and_hunting_and_jitter_do_not() {
+    let spread = |sim: &str, from_s: f64| {
+        let mut bench = bench(sim);
+        go(&mut bench, 40, 40, 1736);
+        let seen: Vec<i64> = (0..200)
+            .map(|i| {
+                bench.advance_to(s(from_s + f64::from(i) * 0.003));
+                read(&mut bench, 132, 4)
+            })
+            .collect();
+        seen.iter().max().unwrap() - seen.iter().min().unwrap()
+    };
+    let ring = "ring = { counts = 20, hz = 6, tau_s = 0.4 }";
+    // 200 counts with 40 · 0.229 rpm and 40 · 214.6 rev/min² take 0.38 s.
+    assert!((25..=40).contains(&spread(ring, 0.4)), "{}", spread(ring, 0.4));
+    assert_eq!(spread(ring, 8.0), 0);
+    assert_eq!(spread("hunting = { counts = 2, hz = 10 }", 8.0), 4);
+    assert!((1..=2).contains(&spread("jitter_counts = 1", 8.0)));
+    assert!((3..=9).contains(&spread("encoder_noise_deg = 0.1", 8.0)));
+    assert_eq!(spread("", 8.0), 0);
+}
+
+#[test]
+fn gravity_hangs_an_arm_away_from_the_normal_and_an_arm_without_torque_falls() {
+    let (shown, truth) = ends("gravity_counts = 8", -400, 9.0);
+    // At −80.2° nearly all of it.
+    assert_eq!(shown, -8.0);
+    assert!(
+        (truth + 8.0 * 80.16_f64.to_radians().sin()).abs() < 0.1,
+        "{truth}"
+    );
+    let mut falling = bench("sag_deg_per_s = 10");
+    falling.advance_to(s(2.0));
+    assert!(
+        (falling.pose().light.deg() + 65.0).abs() < 0.1,
+        "{:?}",
+        falling.pose()
+    );
+    falling.advance_to(s(60.0));
+    assert!(
+        (falling.pose().light.deg() + 100.0).abs() < 0.1,
+        "{:?}",
+        falling.pose()
+    );
+    write(&mut falling, 64, 1, 1).unwrap();
+    write(&mut falling, 116, 4, 1536).unwrap();
+    falling.advance_to(s(90.0));
+    assert!(
+        (falling.pose().light.deg() + 45.0).abs() < 0.1,
+        "{:?}",
+        falling.pose()
+    );
+}
+
+#[test]
+fn an_encoder_that_errs_sends_the_arm_elsewhere_and_does_not_show_it() {
+    // On the way the light goes from −45° to −75°, where the error is 1° · sin(2 · 75°) more.
+    let (shown, truth) = ends("encoder_error = { amplitude_deg = 1.0, periods = 2 }", -341, 9.0);
+    assert_eq!(shown, 0.0);
+    let expected = (2.0 * 75f64.to_radians()).sin() * 4096.0 / 360.0;
+    assert!((truth - expected).abs() < 0.1, "{truth} instead of {expected}");
+}
+
+#[test]
+fn a_hand_turns_an_arm_only_while_it_has_no_torque() {
+    let turn = |torque: i64| {
+        let mut bench = bench("");
+        write(&mut bench, 64, 1, torque).unwrap();
+        bench.schedule(Fault {
+            device: rig::Device::Light,
+            at: s(1.0),
+            what: Disturbance::Turn(20.0),
+        });
+        bench.advance_to(s(2.0));
+        bench.pose().light.deg() + 45.0
+    };
+    assert!((turn(0) - 20.0).abs() < 0.1, "{}", turn(0));
+    assert!(turn(1).abs() < 0.1, "{}", turn(1));
+}
+
+proptest! {
+    /// In how many steps time advances, and how often somebody looks, changes nothing.
+    #[test]
+    fn prop_mechanics_are_a_function_of_time_alone(
+        goals in prop::collection::vec((1100..3000_i64, 0.01..2.0_f64), 1..5), looks in 1..40_u32,
+        friction in 0.0..8.0_f64, tremble in 0.0..4.0_f64,
+    ) {
+        let sim = format!(
+            "static_error_counts = {friction}\nstiction_counts = {tremble}\njitter_counts = {tremble}\n\
+             gravity_counts = {friction}\nring = {{ counts = 20, hz = 6, tau_s = 0.4 }}\n\
+             creep = {{ counts = 6, counts_per_s = 50 }}"
+        );
+        let run = |looks: u32| {
+            let mut bench = bench(&sim);
+            let mut now_s = 0.0;
+            for &(goal, wait_s) in &goals {
+                go(&mut bench, 40, 40, goal);
+                for look in 1..=looks {
+                    bench.advance_to(s(now_s + wait_s * f64::from(look) / f64::from(looks)));
+                    read(&mut bench, 132, 4);
+                }
+                now_s += wait_s;
+            }
+            (bench.pose().light.deg(), read(&mut bench, 132, 4))
+        };
+        prop_assert_eq!(run(1), run(looks));
+    }
+}
