@@ -1,5 +1,7 @@
 //! The law, over what the devices were told.
 
+use std::time::Duration;
+
 use arms::{Arm, Pose};
 use firmware_sim::in_process::{SharedBench, Written};
 use goniod::FaultId;
@@ -13,6 +15,8 @@ use crate::script::Op;
 pub(crate) struct Mark {
     /// Writes before it.
     pub(crate) writes: usize,
+    /// When, by the rig's clock.
+    pub(crate) at: Duration,
     /// Where the arms were.
     pub(crate) pose: Pose,
     /// Which of the things that were asked for, from 0.
@@ -28,6 +32,8 @@ pub(crate) enum What {
     Answered { op: Op, fault: Option<FaultId> },
     /// It was refused.
     Refused,
+    /// The sensor servo hears nothing for so long, and goes on with what it was doing.
+    Silenced(Duration),
 }
 
 /// Profile acceleration of the rig file's default, rad/s².
@@ -135,6 +141,19 @@ fn asked_since_stopped(before: &[&Mark]) -> bool {
         .any(|mark| matches!(mark.what, What::Asked { op, .. } if op.asks_to_move()))
 }
 
+/// For how long after a moment the sensor servo heard nothing.
+fn deaf(marks: &[Mark], since: Duration) -> Duration {
+    let mut until = since;
+    for mark in marks {
+        if let What::Silenced(time) = mark.what
+            && mark.at <= until
+        {
+            until = until.max(mark.at + time);
+        }
+    }
+    until - since
+}
+
 /// Arms that went farther after the last answered stop than they need to brake, although nobody asked for a motion.
 fn overruns(bench: &SharedBench, marks: &[Mark]) -> Vec<String> {
     let Some(place) = marks
@@ -152,7 +171,12 @@ fn overruns(bench: &SharedBench, marks: &[Mark]) -> Vec<String> {
     let braking = FASTEST_RAD_S * FASTEST_RAD_S / (2.0 * BRAKING_RAD_S2);
     let now = bench.pose();
     let way = |arm: &Arm| (now.angle(*arm) - marks[place].pose.angle(*arm)).abs();
-    let far = Arm::BOTH.into_iter().filter(|arm| way(arm) > 1.1 * braking);
+    // Nobody can stop an arm whose servo hears nothing, until it hears again.
+    let deaf_rad = FASTEST_RAD_S * deaf(marks, marks[place].at).as_secs_f64();
+    let far = Arm::BOTH.into_iter().filter(|arm| {
+        let unheard_rad = if *arm == Arm::Sensor { deaf_rad } else { 0.0 };
+        way(arm) > 1.1 * braking + unheard_rad
+    });
     far.map(|arm| format!("the {arm} arm went {:.2}° after the stop", way(&arm).to_degrees()))
         .collect()
 }

@@ -22,6 +22,9 @@ use crate::script::{Delay, Op, Script};
 /// Long enough to be under way as long as anybody looks.
 const JOB: &str = "on_stage = true\n[[plane]]\ntheta_r_deg = 60\nreadings = 200\n";
 
+/// For how long a device that falls silent hears nothing.
+const SILENCE: Duration = Duration::from_millis(300);
+
 /// How long everything is left alone at the end.
 const SETTLE: Duration = Duration::from_secs(4);
 
@@ -150,10 +153,17 @@ impl World {
             Op::StoreFailing => return self.store.behave(Behaviour::Failing),
             Op::StorePrompt => return self.store.behave(Behaviour::Prompt),
             Op::DeviceSilent => {
+                self.marks.lock().unwrap().push(Mark {
+                    writes: bench.write_count(),
+                    at: bench.now(),
+                    pose: bench.pose(),
+                    number: usize::MAX,
+                    what: What::Silenced(SILENCE),
+                });
                 return bench.schedule(Fault {
                     device: rig::Device::Sensor,
                     at: Duration::ZERO,
-                    what: Disturbance::Silence(Duration::from_millis(300)),
+                    what: Disturbance::Silence(SILENCE),
                 });
             }
             _ => {}
@@ -165,6 +175,7 @@ impl World {
             let pose = bench.pose();
             marks.lock().unwrap().push(Mark {
                 writes: bench.write_count(),
+                at: bench.now(),
                 pose,
                 number,
                 what,
