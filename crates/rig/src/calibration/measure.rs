@@ -204,10 +204,6 @@ impl Trap {
                     });
                 }
             }
-            eprintln!(
-                "TRAP {:.0}s {:?} {:?} -> {:?}",
-                taken.time_s, taken.counts.exposure, taken.counts.rgb, rate.rgb
-            );
             points.push((before.aligned(taken.pose), rate.rgb));
         }
         if points.is_empty() {
