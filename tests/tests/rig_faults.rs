@@ -65,7 +65,7 @@ async fn arms_settle_where_they_are_told_and_readings_come() {
     for (i, pose) in poses().enumerate() {
         let settled = drive.travel(&[pose]).await.unwrap();
         for arm in Arm::BOTH {
-            let error = (settled.pose().angle(arm) - pose.angle(arm)).to_degrees().abs();
+            let error = (settled.pose.angle(arm) - pose.angle(arm)).to_degrees().abs();
             assert!(error <= 0.1, "{arm} arm {error}° off at reading {i}");
         }
         let counts = drive.expose(EXPOSURE).await.unwrap();
@@ -122,7 +122,7 @@ async fn a_broken_bus_costs_retries_and_nothing_else() {
                 .unwrap_or_else(|error| panic!("{wire:?}: {error:?}"));
             let truth = server.bench(|bench| bench.pose());
             for arm in Arm::BOTH {
-                let error = (settled.pose().angle(arm) - truth.angle(arm)).to_degrees().abs();
+                let error = (settled.pose.angle(arm) - truth.angle(arm)).to_degrees().abs();
                 assert!(
                     error < 0.1,
                     "{wire:?}: {arm} arm believed {error}° off at reading {i}"

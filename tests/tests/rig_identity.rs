@@ -276,7 +276,7 @@ async fn a_geared_and_reversed_arm_is_told_in_counts() {
     drive.identify_all().await.unwrap();
     drive.engage_all().await.unwrap();
     let goal = Pose::from_deg(-30.0, 20.0);
-    let settled = drive.travel(&[goal]).await.unwrap().pose();
+    let settled = drive.travel(&[goal]).await.unwrap().pose;
     let truth = server.bench(|bench| bench.pose());
     for arm in Arm::BOTH {
         let error = (settled.angle(arm) - goal.angle(arm)).to_degrees();

@@ -284,6 +284,7 @@ mod tests {
             retries: 0,
             flags: Vec::new(),
             swept_rad: None,
+            spread_rad: None,
         }
     }
 

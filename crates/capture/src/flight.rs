@@ -52,7 +52,7 @@ impl<'a> Flight<'a> {
             .collect();
         let poses: Vec<Pose> = steps.iter().map(Step::pose).collect();
         // Where an arm is in flight is foreseen no better than to where it comes to rest.
-        let margin_rad = file.uncertainty.shadow_margin_rad() + file.motion.tolerance_rad;
+        let margin_rad = file.uncertainty.shadow_margin_rad() + file.motion.near_rad;
         let edges = sweep::cells(&poses, lead, &file.envelope, margin_rad);
         let arm = file.arm(lead);
         Self {
@@ -160,15 +160,14 @@ impl<'a> Flight<'a> {
         self.tracks[arm as usize].expected(t_s)
     }
 
-    /// Where the arms were at a moment, and the most by which what was measured around then departs from that, in counts of
-    /// the encoder.
-    pub(crate) fn pose(&self, t_s: f64) -> (Pose, f64) {
+    /// Where the arms were at a moment, and the standard deviations of what was measured around then from that, rad.
+    pub(crate) fn pose(&self, t_s: f64) -> (Pose, [f64; 2]) {
         let at = self.tracks.each_ref().map(|track| track.at(t_s));
         let pose = Pose {
             light: ArmAngle::from_rad(at[0].0),
             sensor: ArmAngle::from_rad(at[1].0),
         };
-        (pose, at[0].1.max(at[1].1) / self.axis.resolution_rad())
+        (pose, [at[0].1, at[1].1])
     }
 
     /// Twice the way, rad, that each arm went from the middle of an integration to that end of it which was further.

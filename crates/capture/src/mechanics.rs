@@ -10,7 +10,7 @@ pub fn mechanics(rig: &RigFile, start: Option<Pose>) -> Mechanics {
     Mechanics {
         envelope: rig.envelope,
         margin_rad: rig.uncertainty.shadow_margin_rad(),
-        tolerance_rad: rig.motion.tolerance_rad,
+        tolerance_rad: rig.motion.near_rad,
         profiles: rig.arms.each_ref().map(|arm| arm.profile),
         resolution_rad: rig.arms.each_ref().map(|arm| arm.axis.resolution_rad()),
         grid_rad: rig
@@ -41,7 +41,7 @@ pub fn mechanics(rig: &RigFile, start: Option<Pose>) -> Mechanics {
                 rig.visits.reference_every.as_secs_f64(),
             )),
         },
-        start,
+        start: start.map(|pose| rig.admitted(pose)),
     }
 }
 

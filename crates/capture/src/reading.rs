@@ -35,8 +35,8 @@ pub struct Reading {
     pub lamp: bool,
     /// Where the arms were told to be.
     pub goal: Pose,
-    /// Where they were: measured after settling, or in flight worked out for mid-integration from what was measured around
-    /// it.
+    /// Where they were: the mean of what was measured before, during and after the integration, or in flight worked out
+    /// for mid-integration from what was measured around it.
     pub measured: Pose,
     /// What the photometer said.
     pub counts: Counts,
@@ -49,4 +49,9 @@ pub struct Reading {
     /// In flight, by how much each arm moved within the integration, rad, signed; `None`: they stood still.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub swept_rad: Option<[f64; 2]>,
+    /// At rest, between the smallest and the largest angle of each arm that was measured before, during and after the
+    /// integration, rad: an arm that is held trembles. In flight, twice the standard deviation of what was measured from
+    /// where the arm is worked out to have been. `None` in journals that do not say it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spread_rad: Option<[f64; 2]>,
 }

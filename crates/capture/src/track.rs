@@ -4,7 +4,7 @@ use arms::{Profile, Trajectory};
 /// even at its slowest.
 const WINDOW_S: f64 = 0.08;
 /// Most by which an arm is taken to follow late, s; while it hardly moves yet, whole counts say little.
-const LATEST_S: f64 = 0.1;
+const LATEST_S: f64 = 0.3;
 /// Fewest measurements that are evened out by a line.
 const FEWEST: usize = 4;
 
@@ -103,7 +103,7 @@ impl Track {
         start_s + after + self.late_s()
     }
 
-    /// Where the arm was, by what was measured around then, and the most by which a measurement departs from that, rad.
+    /// Where the arm was, by what was measured around then, and the standard deviation of the measurements from that, rad.
     pub(crate) fn at(&self, t_s: f64) -> (f64, f64) {
         let late_s = self.late_s();
         let mut near: Vec<(f64, f64)> = self
@@ -115,9 +115,9 @@ impl Track {
         let within = near.iter().filter(|(off_s, _)| off_s.abs() <= WINDOW_S).count();
         near.truncate(within.max(FEWEST));
         let (value, slope) = line(&near);
-        let departure = |&(x, y): &(f64, f64)| (y - value - slope * x).abs();
-        let worst = near.iter().map(departure).fold(0.0, f64::max);
-        (self.told(t_s - late_s).0 + value, worst)
+        let square = |&(x, y): &(f64, f64)| (y - value - slope * x).powi(2);
+        let mean = near.iter().map(square).sum::<f64>() / near.len().max(1) as f64;
+        (self.told(t_s - late_s).0 + value, mean.sqrt())
     }
 }
 

@@ -343,6 +343,7 @@ mod tests {
             retries: 2,
             flags,
             swept_rad: None,
+            spread_rad: None,
         })
     }
 

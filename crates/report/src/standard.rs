@@ -278,7 +278,7 @@ impl Standard {
 
 /// Whether the arms keep clear of each other's shadow wherever they may come to rest for a pose, as plans demand.
 fn readable(file: &RigFile, pose: Pose) -> bool {
-    !file.shadowed(file.nearest(pose), [2.0 * file.motion.tolerance_rad; 2])
+    !file.shadowed(file.nearest(pose), [2.0 * file.motion.near_rad; 2])
 }
 
 /// Mean reflectance factor of what lies on the stage, in the sensor's own colours.

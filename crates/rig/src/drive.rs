@@ -9,12 +9,16 @@ mod all;
 mod error;
 mod expose;
 mod fly;
+mod hindrance;
 mod pulse;
+mod rest;
 mod retry;
 mod travel;
 
 pub use error::DriveError;
+pub use hindrance::Hindrance;
 use pulse::Pulse;
+pub use rest::Rest;
 
 /// Longest wait between two looks at a rig that is engaged or lit: soon enough to stop the other arm when one fails.
 const LOOK: Duration = Duration::from_millis(200);
@@ -35,6 +39,11 @@ pub struct Drive<R: Rig> {
     waited: Duration,
     engaged: bool,
     lamp: bool,
+    /// How late each arm came to rest behind its profile the last time, and by how much it trembled there, rad.
+    late: [Option<Duration>; 2],
+    tremble_rad: [f64; 2],
+    /// By how much the goal of each arm had to be moved for it to come near the pose that was asked for, rad.
+    trim_rad: [f64; 2],
     seen: watch::Sender<Option<Snapshot>>,
     pulse: Pulse,
 }
@@ -49,6 +58,9 @@ impl<R: Rig> Drive<R> {
             waited: Duration::ZERO,
             engaged: false,
             lamp: false,
+            late: [None; 2],
+            trim_rad: [0.0; 2],
+            tremble_rad: [0.0; 2],
             seen: watch::Sender::new(None),
             pulse: Pulse::default(),
         }
@@ -170,8 +182,9 @@ impl<R: Rig> Drive<R> {
             arm,
             goal: location.goal,
             measured: location.measured,
-            tolerance_rad: self.file.motion.tolerance_rad,
+            near_rad: self.file.motion.near_rad,
             after,
+            hindrance: Hindrance::Creep,
         })
     }
 

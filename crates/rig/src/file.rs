@@ -182,9 +182,11 @@ pub struct ArmSettings {
 /// `[motion]`
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionSettings {
-    /// Arrived: measured position within this of the goal, rad.
-    pub tolerance_rad: f64,
-    /// How long an arm must have been there before a reading.
+    /// An arm that stands still within this of its goal has arrived, rad.
+    pub near_rad: f64,
+    /// An arm stands still whose measured angles lie within this over the settling time, rad.
+    pub still_rad: f64,
+    /// How long an arm must have stood still before a reading.
     pub settle: Duration,
     /// By how much a motion may overrun its profile.
     pub timeout: Duration,
@@ -277,6 +279,41 @@ impl RigFile {
         let clearance = self.envelope.clearance_rad(pose, swept_rad);
         // NaN is nowhere.
         clearance.is_nan() || clearance < self.uncertainty.shadow_margin_rad()
+    }
+
+    /// By how much arms may stand outside the envelope without it being a fault, rad: twice what is near enough, since an
+    /// arm may stand off its goal by as much, and give way a little more when nobody looks.
+    pub fn slack_rad(&self) -> f64 {
+        2.0 * self.motion.near_rad
+    }
+
+    /// The pose within the envelope that arms which stand at `pose` are taken to have: that itself, or where they stand
+    /// outside by no more than the slack of each arm, the nearest within. Farther outside it is left as it is.
+    pub fn admitted(&self, pose: Pose) -> Pose {
+        let slack_rad = self.slack_rad();
+        let mut within = pose;
+        for arm in Arm::BOTH {
+            let (angle, limits) = (pose.angle(arm), self.envelope.limits(arm));
+            let nearest = angle.rad().clamp(limits.min.rad(), limits.max.rad());
+            if (nearest - angle.rad()).abs() > slack_rad {
+                return pose;
+            }
+            within = within.with(arm, ArmAngle::from_rad(nearest));
+        }
+        // A hair more, so that rounding does not leave them too close.
+        let lacking = self.envelope.separation_rad - within.separation_rad() + 1e-9;
+        if self.envelope.can_pass || lacking <= 1e-9 || lacking > 2.0 * slack_rad {
+            return within;
+        }
+        let apart = (within.sensor - within.light).signum();
+        let moved = |arm: Arm, sign: f64| {
+            let angle = ArmAngle::from_rad(within.angle(arm).rad() + sign * apart * lacking);
+            within.with(arm, angle)
+        };
+        [moved(Arm::Sensor, 1.0), moved(Arm::Light, -1.0)]
+            .into_iter()
+            .find(|&pose| self.envelope.check_pose(pose).is_ok())
+            .unwrap_or(within)
     }
 
     /// The pose nearest to `pose` that the servos can be told to take: whole counts.

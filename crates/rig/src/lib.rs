@@ -26,7 +26,7 @@ pub use calibration::{
     ZeroUncertainty, check_dark_set,
 };
 pub use detector::{Counts, Detector, DetectorStatus, Exposure, Gain, Phase};
-pub use drive::{Drive, DriveError};
+pub use drive::{Drive, DriveError, Hindrance, Rest};
 pub use dynamixel::{Adapter, Dynamixel, Usb, ports};
 pub use error::{Place, RigError};
 pub use fault::{Device, Fault, FaultKind};

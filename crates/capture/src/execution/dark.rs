@@ -6,7 +6,7 @@ use sweep::{Step, Sweep};
 
 use super::step::fixed;
 use super::{Execution, Interrupt, readings};
-use crate::{Event, Reading, Record, mechanics};
+use crate::{Event, Reading, Record};
 
 /// Sets of dark readings that are taken until one can be believed; then light from outside is a fault.
 const MOST_SETS: u32 = 4;
@@ -63,9 +63,8 @@ impl<R: Rig> Execution<'_, R> {
             self.switch_lamp(false).await?;
         }
         self.standing = None;
-        let (from, to) = (self.drive.snapshot().await?.pose(), steps[0].pose());
-        let mechanics = mechanics(self.file, Some(from));
-        let path = sweep::way(&mechanics, from, to).map_err(Interrupt::Way)?;
+        let to = steps[0].pose();
+        let path = self.way(to).await?;
         self.drive.travel(&path[..path.len() - 1]).await?;
         self.drive.set_off(to).await?;
         for step in steps {

@@ -1,6 +1,7 @@
 use std::time::Duration;
 
-use rig::{Counts, DriveError, Exposure, Observation, Rig};
+use arms::Arm;
+use rig::{Counts, DriveError, Exposure, Hindrance, Observation, Rig};
 use sweep::Step;
 
 use super::{Execution, Interrupt, TICKS_PER_S};
@@ -16,11 +17,11 @@ const POLL: Duration = Duration::from_millis(1);
 /// Share of a value that motion within the integration may have added to it; beyond, the correction is not trusted and the
 /// reading is taken again at rest.
 const MOST_BLUR: f64 = 0.05;
-/// By how many counts of the encoder a measurement may depart from where an arm is worked out to have been; beyond, it did
-/// not move as it was told.
-const UNSTEADY_COUNTS: f64 = 1.5;
+/// Standard deviation of what is measured from where an arm is worked out to have been, in counts of the encoder, beyond
+/// which it did not move as it was told. A tremble of ±2 counts is 1.0, hunting by as much 1.4.
+const UNSTEADY_COUNTS: f64 = 2.0;
 /// An arm that is so late is stuck.
-const STUCK: Duration = Duration::from_millis(100);
+const STUCK: Duration = Duration::from_millis(300);
 /// Time between two integrations before any was measured: a few transactions.
 const IDLE_S: f64 = 0.002;
 
@@ -235,16 +236,25 @@ impl<R: Rig> Execution<'_, R> {
         let stuck = flight.moving.iter().find(|&&arm| {
             let off = seen.snapshot.pose().angle(arm).rad() - flight.expected(arm, now_s);
             let speed = self.file.arm(arm).profile.velocity_rad_s;
-            off.abs() > self.file.motion.tolerance_rad + speed * STUCK.as_secs_f64()
+            off.abs() > self.file.motion.near_rad + speed * STUCK.as_secs_f64()
         });
         let Some(&arm) = stuck else { return Ok(()) };
         Err(Interrupt::Fault(DriveError::NotArrived {
             arm,
             goal: arms::ArmAngle::from_rad(flight.expected(arm, now_s)),
             measured: seen.snapshot.pose().angle(arm),
-            tolerance_rad: self.file.motion.tolerance_rad,
+            near_rad: self.file.motion.near_rad,
             after: STUCK,
+            hindrance: Hindrance::Obstacle,
         }))
+    }
+
+    /// Whether an arm did not move as it was told.
+    fn unsteady(&self, deviation_rad: [f64; 2]) -> bool {
+        Arm::BOTH.into_iter().any(|arm| {
+            let count_rad = self.file.arm(arm).axis.resolution_rad();
+            deviation_rad[arm as usize] > UNSTEADY_COUNTS * count_rad
+        })
     }
 
     /// Works out where each reading was taken and records it: as one that counts where the flight landed and it is neither
@@ -254,11 +264,12 @@ impl<R: Rig> Execution<'_, R> {
         for reading in &mut readings {
             let t_s = reading.device_ticks as f64 / TICKS_PER_S;
             let exposure_s = reading.counts.exposure.duration().as_secs_f64();
-            let (measured, departure_counts) = flight.pose(t_s);
+            let (measured, deviation_rad) = flight.pose(t_s);
+            reading.spread_rad = Some(deviation_rad.map(|rad| 2.0 * rad));
             reading.measured = measured;
             reading.flags.clear();
             reading.swept_rad = Some(flight.speeds(t_s).map(|speed| speed * exposure_s));
-            if departure_counts > UNSTEADY_COUNTS {
+            if self.unsteady(deviation_rad) {
                 reading.flags.push(Flag::Blurred);
             }
             if self.file.shadowed(measured, flight.reach(t_s, exposure_s)) {

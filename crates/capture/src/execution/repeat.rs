@@ -15,8 +15,8 @@ impl<R: Rig> Execution<'_, R> {
         // In flight a reading is not taken at its step's pose itself.
         let taken = self.file.nearest(before.measured);
         let there = before.swept_rad.is_some() && self.file.envelope.check_pose(taken).is_ok();
-        let measured = self.travel_anew(if there { taken } else { before.goal }).await?;
-        let counts = self.drive.expose(before.counts.exposure).await?;
+        self.travel_anew(if there { taken } else { before.goal }).await?;
+        let (counts, rest) = self.drive.expose_at_rest(before.counts.exposure).await?;
         if self.lamp_is_out(&counts) {
             return Err(Interrupt::Lamp);
         }
@@ -24,7 +24,8 @@ impl<R: Rig> Execution<'_, R> {
             accepted: false,
             sweep: Sweep::Repeat,
             swept_rad: None,
-            measured,
+            measured: rest.pose,
+            spread_rad: Some(rest.spread_rad),
             counts,
             device_ticks: self.clock.unwrap(counts.ticks),
             retries: self.drive.retries() - retries,

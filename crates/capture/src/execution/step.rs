@@ -1,5 +1,5 @@
 use arms::Pose;
-use rig::{Counts, Exposure, Gain, Lamp, Rig};
+use rig::{Counts, Exposure, Gain, Lamp, Rest, Rig};
 use sweep::Step;
 
 use super::{Execution, Interrupt};
@@ -24,40 +24,47 @@ impl<R: Rig> Execution<'_, R> {
             self.switch_lamp(step.lamp).await?;
         }
         let mut retries = self.drive.retries();
-        let measured = self.travel(step).await?;
+        self.travel(step).await?;
         let fixed = fixed(step);
         let mut exposure = fixed.unwrap_or_else(|| self.ranging.first(step.sweep, step.pose()));
         let mut beside = None;
         for left in (0..MAX_EXPOSURES).rev() {
-            let counts = self.expose(step, exposure).await?;
+            let (counts, rest) = self.expose(step, exposure).await?;
+            let moved = rest.moved(self.drive.still_rad()).is_some();
             let better = match fixed {
                 None if left > 0 => self.ranging.better(&counts),
                 _ => None,
             };
-            let accepted = better.is_none();
-            retries = self.rested(step, measured, counts, accepted, retries).await?;
-            match better {
-                Some(better) => exposure = better,
-                None => {
-                    beside = self.ranging.beside(&counts).filter(|_| fixed.is_none());
-                    break;
-                }
+            let accepted = better.is_none() && !(moved && left > 0);
+            retries = self.rested(step, rest, counts, accepted, retries).await?;
+            exposure = better.unwrap_or(exposure);
+            if accepted {
+                beside = self.ranging.beside(&counts).filter(|_| fixed.is_none());
+                break;
+            }
+            if moved {
+                // It may swing still, or somebody pushed it: it is waited for where it stands.
+                self.drive.travel(&[step.pose()]).await?;
             }
         }
         if let Some(beside) = beside {
-            let counts = self.expose(step, beside).await?;
-            self.rested(step, measured, counts, false, retries).await?;
+            let (counts, rest) = self.expose(step, beside).await?;
+            self.rested(step, rest, counts, false, retries).await?;
         }
         Ok(())
     }
 
-    /// Exposes, and looks at the lamp.
-    async fn expose(&mut self, step: &Step, exposure: Exposure) -> Result<Counts, Interrupt<R::Error>> {
-        let counts = self.drive.expose(exposure).await?;
+    /// Exposes, and looks at the lamp and at where the arms are meanwhile.
+    async fn expose(
+        &mut self,
+        step: &Step,
+        exposure: Exposure,
+    ) -> Result<(Counts, Rest), Interrupt<R::Error>> {
+        let (counts, rest) = self.drive.expose_at_rest(exposure).await?;
         if step.lamp {
             self.heed_lamp(&counts)?;
         }
-        Ok(counts)
+        Ok((counts, rest))
     }
 
     /// A reading of a step as it is first known: it does not count yet, and nothing is said against it.
@@ -75,6 +82,7 @@ impl<R: Rig> Execution<'_, R> {
             retries: 0,
             flags: Vec::new(),
             swept_rad: None,
+            spread_rad: None,
         }
     }
 
@@ -82,16 +90,20 @@ impl<R: Rig> Execution<'_, R> {
     async fn rested(
         &mut self,
         step: &Step,
-        measured: Pose,
+        rest: Rest,
         counts: Counts,
         accepted: bool,
         retries: u32,
     ) -> Result<u32, Interrupt<R::Error>> {
         let now = self.drive.retries();
-        let mut reading = self.taken(step, counts, measured);
+        let mut reading = self.taken(step, counts, rest.pose);
+        reading.spread_rad = Some(rest.spread_rad);
         reading.accepted = accepted;
         reading.retries = now - retries;
         reading.flags = self.flags(&reading);
+        if rest.moved(self.drive.still_rad()).is_some() {
+            reading.flags.push(Flag::Blurred);
+        }
         self.record(reading, step).await?;
         Ok(now)
     }
@@ -108,7 +120,7 @@ impl<R: Rig> Execution<'_, R> {
             })
         };
         let measured = match self.standing.is_some_and(leads) {
-            true => self.drive.travel(&step.path).await?.pose(),
+            true => self.drive.travel(&step.path).await?.pose,
             false => self.travel_anew(step.pose()).await?,
         };
         self.standing = Some(step.pose());
@@ -117,10 +129,19 @@ impl<R: Rig> Execution<'_, R> {
 
     /// Drives to a pose from wherever the arms are.
     pub(super) async fn travel_anew(&mut self, to: Pose) -> Result<Pose, Interrupt<R::Error>> {
-        let from = self.drive.snapshot().await?.pose();
+        let path = self.way(to).await?;
+        Ok(self.drive.travel(&path).await?.pose)
+    }
+
+    /// The way to a pose from wherever the arms are.
+    pub(super) async fn way(&mut self, to: Pose) -> Result<Vec<Pose>, Interrupt<R::Error>> {
+        let mut from = self.file.admitted(self.drive.snapshot().await?.pose());
+        if self.file.envelope.check_pose(from).is_err() {
+            // They may swing still.
+            from = self.file.admitted(self.drive.stand().await?.pose);
+        }
         let mechanics = mechanics(self.file, Some(from));
-        let path = sweep::way(&mechanics, from, to).map_err(Interrupt::Way)?;
-        Ok(self.drive.travel(&path).await?.pose())
+        sweep::way(&mechanics, from, to).map_err(Interrupt::Way)
     }
 
     /// Whether the monitor saw no light: a photometer that restarted on its own has its lamp off, and says so nowhere.

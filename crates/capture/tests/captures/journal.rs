@@ -51,6 +51,7 @@ fn reading(step: usize) -> Record {
         retries: 0,
         flags: vec![Flag::Saturated],
         swept_rad: None,
+        spread_rad: None,
     })
 }
 

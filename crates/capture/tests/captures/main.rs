@@ -7,6 +7,7 @@ mod fly;
 mod journal;
 mod light;
 mod operator;
+mod servos;
 mod suspend;
 mod time;
 mod whole;

@@ -111,7 +111,7 @@ async fn a_reading_is_durable_before_the_next_motion_starts() {
 async fn arms_are_measured_where_they_were_told_to_be() {
     let mut scene = Scene::new(SHORT, "specimen = \"gold-paint\"").await;
     scene.run(|_| ()).await.unwrap();
-    let tolerance = scene.drive.file().motion.tolerance_rad;
+    let tolerance = scene.drive.file().motion.near_rad;
     for reading in scene.journal.readings() {
         let off = [
             reading.measured.light - reading.goal.light,

@@ -51,6 +51,7 @@ impl<S: RigSource> RigWorker<S> {
             Refusal::unavailable(chain(&error))
         })?;
         let rig = &self.shared.rig;
+        let from = rig.admitted(from);
         let Some((arm, angle)) = to else {
             let path = sweep::way(&mechanics(rig, Some(from)), from, rig.motion.park);
             return path.map_err(|error| Refusal::invalid(&error));

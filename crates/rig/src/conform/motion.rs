@@ -32,7 +32,7 @@ pub(super) async fn timing(drive: &mut Drive<Dynamixel>, arm: Arm, to: Pose) -> 
         let snapshot = drive.snapshot().await?;
         taken_s = since_s(begun, clock_s(drive).await?);
         let location = snapshot.arms[arm as usize];
-        let there = (location.measured - to.angle(arm)).abs() <= drive.file().motion.tolerance_rad;
+        let there = (location.measured - to.angle(arm)).abs() <= drive.file().motion.near_rad;
         if (there && !location.moving) || taken_s > limit_s {
             break;
         }
@@ -63,22 +63,20 @@ pub(super) async fn repeatability(
     let mut errors_deg = Vec::with_capacity(VISITS);
     for _ in 0..VISITS {
         drive.travel(&[away]).await?;
-        let there = drive.travel(&[pose]).await?.pose();
+        let there = drive.travel(&[pose]).await?.pose;
         errors_deg.push((there.angle(arm) - drive.file().nearest(pose).angle(arm)).to_degrees());
     }
     let low = errors_deg.iter().copied().fold(f64::INFINITY, f64::min);
     let high = errors_deg.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let text = format!("{VISITS} visits, measured {low:+.3} … {high:+.3}° off the goal");
-    let tolerance_deg = drive.file().motion.tolerance_rad.to_degrees();
-    Ok(if high - low <= tolerance_deg {
+    let near_deg = drive.file().motion.near_rad.to_degrees();
+    Ok(if high - low <= near_deg {
         Finding::ok(check, text)
     } else {
         Finding::warn(
             check,
             text,
-            format!(
-                "more than motion.tolerance_deg = {tolerance_deg:.3} apart: play, friction, or a loose arm"
-            ),
+            format!("more than motion.near_deg = {near_deg:.3} apart: play, friction, or a loose arm"),
         )
     })
 }

@@ -2,6 +2,7 @@ use std::time::Duration;
 
 use arms::{Arm, ArmAngle, Violation};
 
+use super::Hindrance;
 use crate::fault::hardware_error_names;
 use crate::{Device, Exposure, Fault, FaultKind};
 
@@ -41,8 +42,8 @@ pub enum DriveError<E: Fault> {
     },
     /// An arm did not arrive, or did not stay.
     #[error(
-        "{arm} arm stands at {:.3}° instead of {:.3}° ± {:.3}° after {:.2} s",
-        .measured.deg(), .goal.deg(), .tolerance_rad.to_degrees(), .after.as_secs_f64()
+        "{arm} arm stands at {:.3}° instead of {:.3}° ± {:.3}° after {:.2} s: {hindrance}",
+        .measured.deg(), .goal.deg(), .near_rad.to_degrees(), .after.as_secs_f64()
     )]
     NotArrived {
         /// Which arm.
@@ -52,9 +53,11 @@ pub enum DriveError<E: Fault> {
         /// Where it is.
         measured: ArmAngle,
         /// How near it should be, rad.
-        tolerance_rad: f64,
+        near_rad: f64,
         /// How long it had.
         after: Duration,
+        /// What it looks like.
+        hindrance: Hindrance,
     },
     /// A servo reports a hardware error; its torque may be off.
     #[error("{arm} servo reports {} at {:.3}°; remove the cause, then switch its power off and on", hardware_error_names(Device::from(*.arm), *.bits), .measured.deg())]

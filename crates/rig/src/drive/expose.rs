@@ -1,15 +1,20 @@
 use std::time::Duration;
 
+use super::rest::Looks;
 use super::retry::Patience;
-use super::{Drive, DriveError};
-use crate::{Counts, Exposure, FaultKind, Rig};
-use crate::{Detector, Fault};
+use super::{Drive, DriveError, Rest};
+use crate::{Counts, Detector, Exposure, Fault, FaultKind, Rig};
 
 /// Sequence numbers have 24 bits (docs/photometer.md).
 const SEQUENCE_MODULUS: u32 = 1 << 24;
+/// So has its clock.
+const TICKS_MODULUS: u32 = 1 << 24;
 
 /// Time between two looks at an integration that should have ended.
 const POLL: Duration = Duration::from_millis(1);
+
+/// Time between two looks at the arms while it runs: several in a tremble of 20 Hz.
+const SIGHT: Duration = Duration::from_millis(10);
 
 impl<R: Rig> Drive<R> {
     /// Takes one reading: triggers once, waits for the integration, reads the counts.
@@ -20,33 +25,48 @@ impl<R: Rig> Drive<R> {
     /// # Errors
     /// A silent or failing photometer; a reading that is not the one triggered.
     pub async fn expose(&mut self, exposure: Exposure) -> Result<Counts, DriveError<R::Error>> {
-        let before = self.sequence().await?;
-        let expected = self.trigger(before, exposure).await?;
+        self.expose_at_rest(exposure).await.map(|(counts, _)| counts)
+    }
+
+    /// As [`Drive::expose`], and where the arms were: looked at before, during and after the integration.
+    ///
+    /// # Errors
+    /// As [`Drive::expose`] and [`Drive::snapshot`].
+    pub async fn expose_at_rest(
+        &mut self,
+        exposure: Exposure,
+    ) -> Result<(Counts, Rest), DriveError<R::Error>> {
+        let mut looks = Looks::default();
+        let seen = self.observe().await?;
+        looks.push(Duration::ZERO, seen.snapshot.pose());
+        let begun = seen.ticks;
+        let expected = self.trigger(seen.snapshot.detector.sequence, exposure).await?;
         let wrong = |found: String| DriveError::Reading {
             expected,
             exposure,
             found,
         };
         let waited = self.waited;
-        self.wait(exposure.duration()).await?;
+        let mut left = exposure.duration();
         loop {
-            let counts = self
-                .retry("read the photometer's counts", |rig| {
-                    Box::pin(rig.photometer().counts())
-                })
+            self.wait(left.clamp(POLL.min(exposure.duration()), SIGHT))
                 .await?;
-            match counts {
+            let seen = self.observe().await?;
+            let ticks = seen.ticks.wrapping_sub(begun) % TICKS_MODULUS;
+            let passed = Duration::from_micros(10 * u64::from(ticks));
+            looks.push(passed, seen.snapshot.pose());
+            match seen.counts {
                 Some(counts) if counts.sequence != expected => {
                     return Err(wrong(format!("reading {} came", counts.sequence)));
                 }
                 Some(counts) if counts.exposure != exposure => {
                     return Err(wrong(format!("it was taken with {:?}", counts.exposure)));
                 }
-                Some(counts) => return Ok(counts),
+                Some(counts) => return Ok((counts, looks.all())),
                 None if self.waited - waited > exposure.duration() + self.file.motion.timeout => {
                     return Err(wrong("still integrating".to_owned()));
                 }
-                None => self.wait(POLL).await?,
+                None => left = exposure.duration().saturating_sub(passed),
             }
         }
     }

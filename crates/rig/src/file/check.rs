@@ -221,10 +221,12 @@ fn motion(source: &Source<'_>, raw: &RawMotion, envelope: &Envelope) -> Result<M
         ("down", Approach::Down),
     ];
     let estops = [("hold", Estop::Hold), ("limp", Estop::Limp)];
-    let tolerance = source.within("motion.tolerance_deg", &raw.tolerance_deg, 0.05..=5.0)?;
+    let near = source.within("motion.near_deg", &raw.near_deg, 0.05..=5.0)?;
+    let still = source.within("motion.still_deg", &raw.still_deg, 0.02..=5.0)?;
     let overshoot = source.within("motion.overshoot_deg", &raw.overshoot_deg, 0.0..=10.0)?;
     Ok(MotionSettings {
-        tolerance_rad: tolerance.to_radians(),
+        near_rad: near.to_radians(),
+        still_rad: still.to_radians(),
         settle: millis(source, "motion.settle_ms", &raw.settle_ms, 0.0..=5000.0)?,
         timeout: millis(source, "motion.timeout_ms", &raw.timeout_ms, 50.0..=10000.0)?,
         approach: source.one_of("motion.approach", &raw.approach, &approaches)?,

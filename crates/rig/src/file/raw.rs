@@ -52,7 +52,10 @@ pub(super) struct RawEnvelope {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawMotion {
-    pub(super) tolerance_deg: Spanned<f64>,
+    /// It was called tolerance_deg.
+    #[serde(alias = "tolerance_deg")]
+    pub(super) near_deg: Spanned<f64>,
+    pub(super) still_deg: Spanned<f64>,
     pub(super) settle_ms: Spanned<f64>,
     pub(super) timeout_ms: Spanned<f64>,
     pub(super) approach: Spanned<String>,
