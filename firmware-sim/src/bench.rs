@@ -15,7 +15,7 @@ use crate::optics::Optics;
 use crate::photodiodes::{Exposed, Light, Photodiodes};
 use crate::photometer::{Integration, Photometer};
 use crate::room::Room;
-use crate::servo::{Model, Servo};
+use crate::servo::Servo;
 use crate::{Clock, Device, Fault, Mechanics, Mishap, Settings, SimError, baud, photometer, servo};
 
 /// Stream of random numbers for what is drawn once; readings use the streams 0, 1, …
@@ -82,8 +82,8 @@ impl Bench {
             axes: Arm::BOTH.map(|arm| rig.arm(arm).axis),
             zeros_rad: [amounts.light_zero_deg, amounts.sensor_zero_deg].map(f64::to_radians),
             servos: [
-                Servo::new(fitting(rig, &settings, Arm::Light, baud_code)?),
-                Servo::new(fitting(rig, &settings, Arm::Sensor, baud_code)?),
+                Servo::new(fitting(rig, &settings, Arm::Light, baud_code)),
+                Servo::new(fitting(rig, &settings, Arm::Sensor, baud_code)),
             ],
             photometer: photometer(rig, &settings, baud_code),
             photodiodes: Photodiodes {
@@ -326,21 +326,16 @@ fn photometer(rig: &RigFile, settings: &Settings, baud_code: u8) -> Photometer {
     Photometer::new(fitting, lamp, room)
 }
 
-fn fitting(rig: &RigFile, settings: &Settings, arm: Arm, baud_code: u8) -> Result<servo::Fitting, SimError> {
+fn fitting(rig: &RigFile, settings: &Settings, arm: Arm, baud_code: u8) -> servo::Fitting {
     let file = rig.arm(arm);
-    let model = Model::named(&file.model).ok_or_else(|| SimError::Device {
-        what: "servo model",
-        found: file.model.clone(),
-        allowed: Model::names().collect::<Vec<_>>().join(", "),
-    })?;
     let limits = rig.envelope.limits(arm);
     let ends = [limits.min, limits.max].map(|angle| file.axis.counts(angle));
     let backlash_deg = match arm {
         Arm::Light => settings.imperfections.light_backlash_deg,
         Arm::Sensor => settings.imperfections.sensor_backlash_deg,
     };
-    Ok(servo::Fitting {
-        model,
+    servo::Fitting {
+        model: file.model,
         id: file.id,
         baud_code,
         return_delay: file.return_delay,
@@ -353,5 +348,5 @@ fn fitting(rig: &RigFile, settings: &Settings, arm: Arm, baud_code: u8) -> Resul
         seed: settings.seed ^ (arm as u64) << 32,
         boot: settings.boot,
         ambient_c: settings.ambient_c,
-    })
+    }
 }

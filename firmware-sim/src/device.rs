@@ -28,6 +28,11 @@ pub trait Device {
     /// Baud rate of its table, bits per second.
     fn baud(&self) -> u32;
 
+    /// Where it has what the X series has at an address: its own address, of a device with a control table of its own.
+    fn place(&self, address: u16) -> u16 {
+        address
+    }
+
     /// Wait before each status packet.
     fn return_delay(&self) -> Duration;
 

@@ -235,7 +235,7 @@ impl SharedBench {
             return Err(InProcessError::NoReply { device, what });
         }
         asked.heard();
-        match asked.read(register.address, register.size) {
+        match asked.read(asked.place(register.address), register.size) {
             Ok(bytes) => Ok(decode(&bytes)),
             Err(refusal) => Err(InProcessError::Refused {
                 device,
@@ -264,7 +264,7 @@ impl SharedBench {
             written.push(Written::new(at, device, asked, first.address, bytes));
         }
         asked
-            .write(first.address, bytes)
+            .write(asked.place(first.address), bytes)
             .map_err(|refusal| InProcessError::Refused {
                 device,
                 what,

@@ -1,5 +1,4 @@
 mod device;
-mod model;
 mod motion;
 mod path;
 mod registers;
@@ -9,20 +8,15 @@ mod tremble;
 
 use std::time::Duration;
 
-pub(crate) use model::Model;
 use path::Path;
 use registers as reg;
 use rig::Axis;
+use rig::dynamixel::Model;
 
 use crate::fault::Disturbance;
 use crate::node::Node;
 use crate::table::Table;
 use crate::{Device, Mechanics};
-
-/// Firmware that the simulated servos claim: the table with time-based profile, Clear and startup configuration.
-const FIRMWARE_VERSION: u8 = 46;
-/// Encoder counts per turn.
-const TURN: f64 = 4096.0;
 
 /// How a servo leaves the workshop: what the rig file and the `[sim]` table say of it.
 #[derive(Clone, Debug)]
@@ -47,7 +41,7 @@ pub(crate) struct Fitting {
     pub(crate) ambient_c: f64,
 }
 
-/// An X-series servo: its control table and the motion behind it.
+/// A servo: its control table and the motion behind it.
 ///
 /// It moves in the position modes (3, 4, 5). The modes for wheels and torque can be set, so that a host can be seen
 /// to refuse them, and hold the shaft still. Of the gains P and I have an effect; backup and restore do not exist.
@@ -76,10 +70,12 @@ pub(crate) struct Servo {
 impl Servo {
     pub(crate) fn new(fitting: Fitting) -> Self {
         let [low, high] = fitting.limits;
-        let mut table = Table::new(reg::registers(fitting.model));
+        let model = fitting.model;
+        let (first, last) = model.positions().into_inner();
+        let mut table = Table::of(Some(model.series), reg::registers(model));
         table.set(reg::RETURN_DELAY, fitting.return_delay.as_micros() as i64 / 2);
-        table.set(reg::MIN_POSITION, low.floor().max(0.0) as i64);
-        table.set(reg::MAX_POSITION, high.ceil().min(TURN - 1.0) as i64);
+        table.set(reg::MIN_POSITION, low.floor().max(f64::from(first)) as i64);
+        table.set(reg::MAX_POSITION, high.ceil().min(f64::from(last)) as i64);
         let mut servo = Self {
             profile: Path::resting(fitting.start, 0.0),
             shaft: Path::resting(fitting.start, fitting.backlash / 2.0),
@@ -221,10 +217,21 @@ impl Servo {
         self.node.table.get(reg::TORQUE_ENABLE) == 1
     }
 
+    /// Counts of a turn.
+    fn counts_per_turn(&self) -> f64 {
+        f64::from(self.fitting.model.counts_per_turn)
+    }
+
+    /// From now on the register shows the single turn in which the shaft is.
+    fn lose_turns(&mut self) {
+        let shaft = self.direction() * self.shaft.at(self.node.now.as_secs_f64()).0;
+        let first = f64::from(*self.fitting.model.positions().start());
+        self.lost_turns = ((shaft - first) / self.counts_per_turn()).floor() * self.counts_per_turn();
+    }
+
     /// Power comes on: turns are lost, torque is off, or on where Startup Configuration says so.
     fn start_up(&mut self) {
-        let shaft = self.direction() * self.shaft.at(self.node.now.as_secs_f64()).0;
-        self.lost_turns = (shaft / TURN).floor() * TURN;
+        self.lose_turns();
         self.node
             .table
             .set(reg::TORQUE_ENABLE, self.node.table.get(reg::STARTUP) & 1);

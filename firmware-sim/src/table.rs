@@ -1,5 +1,7 @@
 use std::sync::Arc;
 
+use rig::dynamixel::Series;
+
 use crate::Refusal;
 
 /// Who may write a register.
@@ -49,10 +51,6 @@ impl Register {
         Self::new(address, size, Access::Read, 0, (i32::MIN as i64, u32::MAX as i64))
     }
 
-    const fn end(&self) -> u16 {
-        self.address + self.size
-    }
-
     fn decode(&self, bytes: &[u8]) -> i64 {
         let mut wide = [0; 8];
         wide[..bytes.len()].copy_from_slice(bytes);
@@ -67,23 +65,49 @@ impl Register {
 }
 
 /// A control table: registers and the bytes behind them. What a value means is the device's business.
+///
+/// Registers are named by where the X series has them; where this table has them is its series' business. What comes
+/// over the wire are addresses of this table.
 #[derive(Clone, Debug)]
 pub(crate) struct Table {
     registers: Arc<[Register]>,
+    series: Option<&'static Series>,
     bytes: Vec<u8>,
 }
 
 impl Table {
-    /// A table with its initial values.
-    pub(crate) fn new(mut registers: Vec<Register>) -> Self {
-        registers.sort_by_key(|register| register.address);
-        let end = registers.last().map_or(0, Register::end);
+    /// A table with its initial values, whose registers are where they say.
+    pub(crate) fn new(registers: Vec<Register>) -> Self {
+        Self::of(None, registers)
+    }
+
+    /// The same, whose registers are where a series has them.
+    pub(crate) fn of(series: Option<&'static Series>, mut registers: Vec<Register>) -> Self {
+        let place = |address: u16| series.map_or(address, |series| series.place(address));
+        registers.sort_by_key(|register| place(register.address));
+        let end = registers
+            .iter()
+            .map(|register| place(register.address) + register.size)
+            .max();
         let mut table = Self {
             registers: registers.into(),
-            bytes: vec![0; usize::from(end)],
+            series,
+            bytes: vec![0; usize::from(end.unwrap_or_default())],
         };
         table.reset(|_| true);
         table
+    }
+
+    /// Where this table has the register that the X series has at an address.
+    pub(crate) fn place(&self, address: u16) -> u16 {
+        self.series.map_or(address, |series| series.place(address))
+    }
+
+    /// The bytes of a register within the table; none of a register that it lacks.
+    fn range(&self, register: Register) -> Option<std::ops::Range<usize>> {
+        let start = usize::from(self.place(register.address));
+        let range = start..start + usize::from(register.size);
+        (range.end <= self.bytes.len()).then_some(range)
     }
 
     /// Puts the registers that `which` picks back to their initial values.
@@ -96,15 +120,29 @@ impl Table {
         }
     }
 
-    /// The value of a register.
+    /// The value of a register; 0 of one that the table lacks.
     pub(crate) fn get(&self, register: Register) -> i64 {
-        register.decode(&self.bytes[usize::from(register.address)..usize::from(register.end())])
+        self.range(register)
+            .map_or(0, |range| register.decode(&self.bytes[range]))
     }
 
-    /// Sets a register, whatever its access; excess bits are cut.
+    /// Sets a register, whatever its access; excess bits are cut. One that the table lacks stays 0.
     pub(crate) fn set(&mut self, register: Register, value: i64) {
-        self.bytes[usize::from(register.address)..usize::from(register.end())]
-            .copy_from_slice(&value.to_le_bytes()[..usize::from(register.size)]);
+        if !self.has(register) {
+            return;
+        }
+        if let Some(range) = self.range(register) {
+            self.bytes[range].copy_from_slice(&value.to_le_bytes()[..usize::from(register.size)]);
+        }
+    }
+
+    /// Whether the table has a register.
+    pub(crate) fn has(&self, register: Register) -> bool {
+        let place = self.place(register.address);
+        let found = self
+            .registers
+            .binary_search_by_key(&place, |known| self.place(known.address));
+        found.is_ok()
     }
 
     /// The byte at an address of the table.
@@ -138,10 +176,13 @@ impl Table {
             let register = *self
                 .registers
                 .iter()
-                .find(|register| register.address <= at && at < register.end())
+                .find(|register| {
+                    let start = self.place(register.address);
+                    start <= at && at < start + register.size
+                })
                 .ok_or(Refusal::Access)?;
             let size = usize::from(register.size);
-            if register.address != at || rest.len() < size {
+            if self.place(register.address) != at || rest.len() < size {
                 return Err(Refusal::DataLength);
             }
             if register.access == Access::Read {

@@ -7,6 +7,7 @@ mod buffer;
 mod bus;
 mod census;
 mod line;
+mod model;
 mod node;
 mod photometer;
 mod port;
@@ -15,8 +16,9 @@ mod rig;
 mod servo;
 
 pub use census::{Census, Heard};
+pub use model::{Indirect, MODELS, Model, Series};
 pub use photometer::Photometer;
 pub use port::{Adapter, Usb, ports};
-pub use register::{BAUD_RATES, MODELS, PHOTOMETER_MODEL};
+pub use register::{BAUD_RATES, PHOTOMETER_MODEL};
 pub use rig::Dynamixel;
 pub use servo::Servo;

@@ -3,6 +3,7 @@ use std::time::Duration;
 
 use arms::{Arm, ArmAngle, Envelope, Pose, Profile};
 
+use crate::dynamixel::Model;
 use crate::{Axis, Calibration, Lamp, RigError};
 
 mod check;
@@ -51,8 +52,8 @@ pub struct Suspend {
     pub every: Duration,
     /// Temperature of any device, °C.
     pub temperature_c: Option<Band>,
-    /// Supply of any servo, V.
-    pub supply_v: Option<Band>,
+    /// Supply of light and sensor servo, V.
+    pub supply_v: [Option<Band>; 2],
     /// By how much the lamp monitor is off its nominal output, relative.
     pub lamp_rel: Option<Band>,
     /// Room where the readings are kept, bytes.
@@ -169,8 +170,8 @@ pub enum Port {
 pub struct ArmSettings {
     /// Bus id.
     pub id: u8,
-    /// Model name.
-    pub model: String,
+    /// Its model.
+    pub model: &'static Model,
     /// Between counts and arm angle.
     pub axis: Axis,
     /// Speed and acceleration, already rounded to what the servo's registers can hold.

@@ -19,7 +19,7 @@ mod surroundings;
 mod wall_clock;
 
 pub use actuator::{Actuator, Identity, Location};
-pub use axis::{ACCELERATION_UNIT_RAD_S2, Axis, COUNTS_PER_TURN, VELOCITY_UNIT_RAD_S};
+pub use axis::{Axis, ServoUnits};
 pub use calibration::{
     Budget, Calibration, Certificate, Certified, Colour, Conditions, Dark, DarkCounts, DarkFault, Darks,
     Drift, Filling, Lamp, MIN_COSINE, Patch, Reduction, Reflectance, Taken, Trap, Unusable, White, Zero,

@@ -1,5 +1,6 @@
 use arms::{Arm, ArmAngle, Profile};
-use rig::dynamixel::register::{MODELS, Register, common, servo};
+use rig::dynamixel::Model;
+use rig::dynamixel::register::{Register, common, servo};
 use rig::{Actuator, ArmSettings, Device, Estop, Identity, Location, MotionSettings, RigFile};
 
 use super::{InProcessError, SharedBench};
@@ -66,6 +67,9 @@ impl InProcessAxis {
     fn differences(&self) -> Result<Vec<String>, InProcessError> {
         let [velocity, _] = self.arm.axis.profile_registers(self.arm.profile);
         let exactly = |value: i64| value..=value;
+        let model = self.arm.model;
+        let (first, last) = model.positions().into_inner();
+        let homing = i64::from(model.homing_offset_max());
         let rules = [
             (servo::OPERATING_MODE, exactly(POSITION)),
             (servo::DRIVE_MODE, exactly(0)),
@@ -75,16 +79,25 @@ impl InProcessAxis {
                 exactly(self.arm.return_delay.as_micros() as i64 / 2),
             ),
             // Beyond, position mode ignores it.
-            (servo::HOMING_OFFSET, -1024..=1024),
-            (servo::MIN_POSITION_LIMIT, 0..=self.range[0].round() as i64),
-            (servo::MAX_POSITION_LIMIT, self.range[1].round() as i64..=4095),
-            (servo::VELOCITY_LIMIT, i64::from(velocity)..=1023),
+            (servo::HOMING_OFFSET, -homing..=homing),
+            (
+                servo::MIN_POSITION_LIMIT,
+                first.into()..=self.range[0].round() as i64,
+            ),
+            (
+                servo::MAX_POSITION_LIMIT,
+                self.range[1].round() as i64..=last.into(),
+            ),
+            (
+                servo::VELOCITY_LIMIT,
+                i64::from(velocity)..=i64::from(self.arm.axis.units.velocity_max),
+            ),
         ];
         let mut differences = Vec::new();
         for (register, wanted) in rules {
             let found = self.read(register)?;
             if !wanted.contains(&found) {
-                let Register { name, address, .. } = register;
+                let Register { name, address, .. } = model.at(register);
                 let (min, max) = wanted.into_inner();
                 differences.push(format!(
                     "{name} is {found}, allowed: {min} … {max}; write it to address {address}"
@@ -101,11 +114,11 @@ impl Actuator for InProcessAxis {
     async fn identify(&mut self) -> Result<Identity, InProcessError> {
         let device = self.device;
         let number = self.read(common::MODEL_NUMBER)?;
-        let model = MODELS.iter().find(|model| i64::from(model.1) == number);
-        let name = model.map_or_else(|| format!("model number {number}"), |model| model.0.to_owned());
+        let model = u16::try_from(number).ok().and_then(Model::numbered);
+        let name = model.map_or_else(|| format!("model number {number}"), |model| model.name.to_owned());
         let mut differences = self.differences()?;
-        if name != self.arm.model {
-            differences.insert(0, format!("it is a {name}, must be a {}", self.arm.model));
+        if model != Some(self.arm.model) {
+            differences.insert(0, format!("it is a {name}, must be a {}", self.arm.model.name));
         }
         if !differences.is_empty() {
             return Err(InProcessError::Mismatch { device, differences });
@@ -157,13 +170,14 @@ impl Actuator for InProcessAxis {
         let present = self.read(servo::PRESENT_POSITION)? as f64;
         let velocity = self.read(servo::PRESENT_VELOCITY)?;
         let acceleration = self.read(servo::PROFILE_ACCELERATION)?;
+        let units = self.arm.axis.units;
         let [v, a] = [
-            velocity as f64 * rig::VELOCITY_UNIT_RAD_S,
-            acceleration as f64 * rig::ACCELERATION_UNIT_RAD_S2,
+            velocity as f64 * units.velocity_rad_s,
+            acceleration as f64 * units.acceleration_rad_s2,
         ];
         let way = match acceleration {
             0 => 0.0,
-            _ => v * v.abs() / (2.0 * a) * rig::COUNTS_PER_TURN / std::f64::consts::TAU,
+            _ => units.counts(v * v.abs() / (2.0 * a)),
         };
         // Braking must not lead beyond where the arm was going, out of the limits, nor back.
         let heading = self.read(servo::GOAL_POSITION)? as f64 - present;

@@ -2,6 +2,7 @@ use std::f64::consts::PI;
 use std::time::Duration;
 
 use arms::{Arm, Pose};
+use rig::dynamixel::Model;
 use rig::{Detector, Drive, Exposure, FaultKind, Gain, Rig, RigFile};
 
 use super::InProcessRig;
@@ -193,7 +194,7 @@ async fn a_silent_host_puts_the_lamp_out_and_stops_the_arms() {
 async fn another_model_is_told_before_anything_moves() {
     let simulated = file("");
     let mut claimed = simulated.clone();
-    claimed.arms[0].model = "XM540-W270".to_owned();
+    claimed.arms[0].model = Model::named("XM540-W270").unwrap();
     let rig = InProcessRig::over(crate::Bench::new(&simulated).unwrap(), &claimed);
     let error = Drive::new(rig, claimed).identify_all().await.unwrap_err();
     assert_eq!(

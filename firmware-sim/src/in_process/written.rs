@@ -13,13 +13,13 @@ pub struct Written {
     pub at: Duration,
     /// Which device.
     pub device: Which,
-    /// Address of the first byte.
+    /// Address of the first byte, of the X series.
     pub address: u16,
     /// The bytes.
     pub bytes: Vec<u8>,
     /// Present Position of a servo before the write, counts; 0 of the photometer.
     pub position: i64,
-    /// Present Velocity of a servo before the write, units of 0.229 rev/min; 0 of the photometer.
+    /// Present Velocity of a servo before the write, in its units; 0 of the photometer.
     pub velocity: i64,
 }
 
@@ -35,7 +35,7 @@ impl Written {
             Which::Photometer => 0,
             // A servo has both registers whatever was written before.
             Which::Light | Which::Sensor => device
-                .read(register.address, register.size)
+                .read(device.place(register.address), register.size)
                 .map_or(0, |bytes| decode(&bytes)),
         };
         Self {

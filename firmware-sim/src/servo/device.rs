@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Servo, TURN, reg};
+use super::{Servo, reg};
 use crate::table::{Access, Register};
 use crate::{Device, Refusal};
 
@@ -16,6 +16,10 @@ impl Device for Servo {
 
     fn baud(&self) -> u32 {
         self.node.baud()
+    }
+
+    fn place(&self, address: u16) -> u16 {
+        self.node.table.place(address)
     }
 
     fn return_delay(&self) -> Duration {
@@ -47,16 +51,8 @@ impl Device for Servo {
     }
 
     fn write(&mut self, address: u16, bytes: &[u8]) -> Result<(), Refusal> {
-        self.node.table.check_stretch(address, bytes.len())?;
-        let mut values = Vec::new();
-        for (address, bytes) in self.direct(address, bytes) {
-            values.extend(self.node.table.parse(address, &bytes)?);
-        }
-        self.check(&values)?;
-        for (register, value) in values {
-            self.apply(register, value);
-        }
-        Ok(())
+        let values = self.values(address, bytes)?;
+        self.take(values)
     }
 
     fn registered(&mut self, waits: bool) {
@@ -76,8 +72,7 @@ impl Device for Servo {
         if self.moves() {
             return Err(Refusal::Result);
         }
-        let shaft = self.direction() * self.shaft.at(self.node.now.as_secs_f64()).0;
-        self.lost_turns = (shaft / TURN).floor() * TURN;
+        self.lose_turns();
         self.stand();
         Ok(())
     }
@@ -90,10 +85,30 @@ impl Device for Servo {
 }
 
 impl Servo {
+    /// What a write asks for, behind indirect data too.
+    fn values(&self, address: u16, bytes: &[u8]) -> Result<Vec<(Register, i64)>, Refusal> {
+        self.node.table.check_stretch(address, bytes.len())?;
+        let mut values = Vec::new();
+        for (address, bytes) in self.direct(address, bytes) {
+            values.extend(self.node.table.parse(address, &bytes)?);
+        }
+        Ok(values)
+    }
+
+    /// Takes all values, or none.
+    fn take(&mut self, values: Vec<(Register, i64)>) -> Result<(), Refusal> {
+        self.check(&values)?;
+        for (register, value) in values {
+            self.apply(register, value);
+        }
+        Ok(())
+    }
+
     /// Where an address leads: itself, or what its indirect address register says. One level deep; the cells of the
     /// indirect areas are what they are unless mapped.
     fn target(&self, address: u16) -> u16 {
-        reg::indirect(address).map_or(address, |register| self.node.table.get(register) as u16)
+        reg::indirect(self.fitting.model.series, address)
+            .map_or(address, |register| self.node.table.get(register) as u16)
     }
 
     /// A write as writes to whole stretches of direct addresses.
@@ -123,10 +138,22 @@ impl Servo {
             if tripped && (reg::GOALS.into_iter().any(is) || is(reg::BUS_WATCHDOG) && value != 0) {
                 return Err(Refusal::DataRange);
             }
-            if is(reg::OPERATING_MODE) && ![0, 1, 3, 4, 5, 16].contains(&value) {
+            if is(reg::OPERATING_MODE)
+                && !self
+                    .fitting
+                    .model
+                    .modes
+                    .iter()
+                    .any(|&mode| i64::from(mode) == value)
+            {
                 return Err(Refusal::DataRange);
             }
-            let kept = if is(reg::GOAL_PWM) {
+            let profile_limited = self.fitting.model.series.profile_within_limit;
+            let kept = if is(reg::PROFILE_VELOCITY) && profile_limited {
+                within(reg::VELOCITY_LIMIT)
+            } else if is(reg::PROFILE_ACCELERATION) && self.node.table.has(reg::ACCELERATION_LIMIT) {
+                within(reg::ACCELERATION_LIMIT)
+            } else if is(reg::GOAL_PWM) {
                 within(reg::PWM_LIMIT)
             } else if is(reg::GOAL_CURRENT) {
                 within(reg::CURRENT_LIMIT)
@@ -175,8 +202,7 @@ impl Servo {
     /// Direction, mode or offset may have changed: a single turn counts from 0 again.
     fn remap(&mut self) {
         if self.goal_limits().is_some() {
-            let shaft = self.direction() * self.shaft.at(self.node.now.as_secs_f64()).0;
-            self.lost_turns = (shaft / TURN).floor() * TURN;
+            self.lose_turns();
         }
         self.stand();
     }

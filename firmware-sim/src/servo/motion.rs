@@ -2,28 +2,24 @@
 
 use arms::Profile;
 
-use super::{Servo, TURN, reg};
+use super::{Servo, reg};
 use crate::Disturbance;
 use crate::table::Table;
 
-/// Unit of velocity registers, 0.229 rpm, in counts/s.
-const VELOCITY: f64 = 0.229 * TURN / 60.0;
-/// Unit of Profile Acceleration, 214.577 rev/min², in counts/s².
-const ACCELERATION: f64 = 214.577 * TURN / 3600.0;
-/// In position: this close to the goal, counts. The manual names no figure; this is loose enough that the bit alone
+/// In position: this close to the goal, turns. The manual names no figure; this is loose enough that the bit alone
 /// does not mean settled.
-const IN_POSITION: f64 = 5.0;
-/// Following error: this far behind the profile, counts; likewise no figure in the manual.
-const FOLLOWING_ERROR: f64 = 50.0;
+const IN_POSITION: f64 = 5.0 / 4096.0;
+/// Following error: this far behind the profile, turns; likewise no figure in the manual.
+const FOLLOWING_ERROR: f64 = 50.0 / 4096.0;
 /// Present Current while holding, while moving, units of 2.69 mA.
 const HOLDING_CURRENT: i64 = 4;
 const MOVING_CURRENT: i64 = 60;
 /// Below this speed a shaft counts as held, counts/s.
 const HOLDING_SPEED: f64 = 1.0;
-/// Full PWM.
-const PWM: f64 = 885.0;
-/// Supply, 0.1 V.
-const VOLTAGE: i64 = 120;
+/// Present Load of a shaft that is stuck, of a servo without current registers, 0.1 %.
+const FULL_LOAD: u16 = 1000;
+/// Supply to which [`Disturbance::SAG_V`] is the sag, V.
+const SUPPLY_V: f64 = 12.0;
 /// By how much the electronics are warmer than the room, °C, and how fast they become it.
 const SELF_HEATING_C: f64 = 6.0;
 const WARMING_S: f64 = 600.0;
@@ -36,6 +32,16 @@ const EXTENDED: i64 = 4;
 const CURRENT_BASED: i64 = 5;
 
 impl Servo {
+    /// Unit of velocity registers, counts/s.
+    fn velocity_unit(&self) -> f64 {
+        self.fitting.model.series.velocity_unit_rpm * self.counts_per_turn() / 60.0
+    }
+
+    /// Unit of Profile Acceleration, counts/s².
+    fn acceleration_unit(&self) -> f64 {
+        self.fitting.model.series.acceleration_unit_rpm2 * self.counts_per_turn() / 3600.0
+    }
+
     /// +1, or −1 where the drive mode reverses.
     pub(super) fn direction(&self) -> f64 {
         match self.node.table.get(reg::DRIVE_MODE) & 1 {
@@ -65,7 +71,8 @@ impl Servo {
     /// In position mode an offset of more than a quarter turn is ignored (e-manual, "Homing Offset").
     fn homing(&self) -> f64 {
         let offset = self.node.table.get(reg::HOMING_OFFSET);
-        let ignored = self.node.table.get(reg::OPERATING_MODE) == POSITION && offset.abs() > 1024;
+        let ignored = self.node.table.get(reg::OPERATING_MODE) == POSITION
+            && offset.abs() > i64::from(self.fitting.model.homing_offset_max());
         if ignored { 0.0 } else { offset as f64 }
     }
 
@@ -92,7 +99,7 @@ impl Servo {
     /// Whether a profile is under way or the shaft turns faster than the threshold.
     pub(super) fn moves(&self) -> bool {
         let now_s = self.node.now.as_secs_f64();
-        let threshold = self.node.table.get(reg::MOVING_THRESHOLD) as f64 * VELOCITY;
+        let threshold = self.node.table.get(reg::MOVING_THRESHOLD) as f64 * self.velocity_unit();
         now_s < self.profile.end_s() || self.speed(now_s).abs() > threshold
     }
 
@@ -115,7 +122,7 @@ impl Servo {
         }
         let now_s = self.node.now.as_secs_f64();
         let goal = self.meant(self.node.table.get(reg::GOAL_POSITION));
-        let limit = self.node.table.get(reg::VELOCITY_LIMIT) as f64 * VELOCITY;
+        let limit = self.node.table.get(reg::VELOCITY_LIMIT) as f64 * self.velocity_unit();
         if limit == 0.0 {
             return;
         }
@@ -172,7 +179,10 @@ impl Servo {
         let (velocity, acceleration) = if velocity == 0.0 {
             return None;
         } else if self.node.table.get(reg::DRIVE_MODE) & 4 == 0 {
-            ((velocity * VELOCITY).min(limit), acceleration * ACCELERATION)
+            (
+                (velocity * self.velocity_unit()).min(limit),
+                acceleration * self.acceleration_unit(),
+            )
         } else {
             // Time-based: the whole motion and its acceleration in ms, the latter at most half of it.
             let (whole_s, ramp_s) = (velocity / 1e3, acceleration.min(velocity / 2.0) / 1e3);
@@ -212,17 +222,23 @@ impl Servo {
         let (shaft, velocity) = (self.shaft.at(now_s).0, self.speed(now_s));
         let (planned, planned_velocity) = self.profile.at(now_s);
         let present = self.present();
-        let behind = (planned - shaft).abs() > FOLLOWING_ERROR;
-        let speed = |counts: f64| (self.direction() * counts / VELOCITY).round() as i64;
+        let behind = (planned - shaft).abs() > FOLLOWING_ERROR * self.counts_per_turn();
+        let speed = |counts: f64| (self.direction() * counts / self.velocity_unit()).round() as i64;
         let holds = velocity.abs() < HOLDING_SPEED;
+        let model = self.fitting.model;
+        let strongest = match model.current_limit {
+            Some(_) => table.get(reg::CURRENT_LIMIT),
+            None => FULL_LOAD.into(),
+        };
         let current = match (self.torque(), behind && self.stalled_until.is_some()) {
             (false, _) => 0,
-            (true, true) => table.get(reg::CURRENT_LIMIT) * speed(planned - shaft).signum(),
+            (true, true) => strongest * speed(planned - shaft).signum(),
             (true, false) if holds => HOLDING_CURRENT,
             (true, false) => MOVING_CURRENT * speed(velocity).signum(),
         };
-        let limit = (table.get(reg::VELOCITY_LIMIT) as f64 * VELOCITY).max(1.0);
-        let pwm = (self.direction() * velocity / limit * PWM).clamp(-PWM, PWM);
+        let limit = (table.get(reg::VELOCITY_LIMIT) as f64 * self.velocity_unit()).max(1.0);
+        let full = f64::from(model.series.pwm_limit);
+        let pwm = (self.direction() * velocity / limit * full).clamp(-full, full);
         let warmth = SELF_HEATING_C * -(-now_s / WARMING_S).exp_m1();
         table.set(reg::REALTIME_TICK, (self.node.now.as_millis() % TICKS) as i64);
         table.set(reg::MOVING, i64::from(self.moves()));
@@ -234,8 +250,11 @@ impl Servo {
         table.set(reg::VELOCITY_TRAJECTORY, speed(planned_velocity));
         table.set(reg::POSITION_TRAJECTORY, self.shown(planned));
         let sags = self.node.now < self.sags_until;
-        let sag = (Disturbance::SAG_V * 10.0) as i64;
-        table.set(reg::PRESENT_VOLTAGE, if sags { sag } else { VOLTAGE });
+        let share = if sags { Disturbance::SAG_V / SUPPLY_V } else { 1.0 };
+        table.set(
+            reg::PRESENT_VOLTAGE,
+            (model.supply_v * share * 10.0).round() as i64,
+        );
         table.set(
             reg::PRESENT_TEMPERATURE,
             (self.fitting.ambient_c + warmth).round() as i64,
@@ -249,7 +268,7 @@ impl Servo {
         }
         let ongoing = self.node.now.as_secs_f64() < self.profile.end_s();
         let off = (present - self.node.table.get(reg::GOAL_POSITION)).abs() as f64;
-        u8::from(off <= IN_POSITION)
+        u8::from(off <= IN_POSITION * self.counts_per_turn())
             | u8::from(ongoing) << 1
             | u8::from(behind) << 3
             | if ongoing { self.profile_type << 4 } else { 0 }

@@ -1,9 +1,7 @@
 use std::time::Duration;
 
 use proptest::prelude::*;
-use rig::dynamixel::MODELS;
 
-use super::Model;
 use crate::{Bench, Device, Disturbance, Fault, Refusal};
 
 fn s(seconds: f64) -> Duration {
@@ -103,18 +101,6 @@ fn disturb(bench: &mut Bench, at: f64, what: Disturbance) {
         at: s(at),
         what,
     });
-}
-
-#[test]
-fn models_are_those_of_the_rig_file() {
-    for (name, number) in MODELS {
-        assert_eq!(
-            Model::named(name).map(|model| model.number),
-            Some(number),
-            "{name}"
-        );
-    }
-    assert_eq!(Model::names().count(), MODELS.len());
 }
 
 #[test]

@@ -16,8 +16,6 @@ const JITTER: [(f64, f64); 3] = [(0.5, 11.3), (0.3, 17.9), (0.2, 29.3)];
 const RUNG_OUT: f64 = 1e-4;
 /// Motions shorter than this ring as much less, counts.
 const FULL_RING: f64 = 100.0;
-/// Position P Gain from the factory, for which the figures of the mechanics hold (e-manual, "Position PID Gain").
-const FACTORY_P: f64 = 800.0;
 /// A P gain n of the table pulls with n/128 units of PWM per count; an I gain n with n/65,536 per count and ms.
 const P_UNIT: f64 = 128.0;
 const I_UNIT: f64 = 65.536;
@@ -25,9 +23,11 @@ const I_UNIT: f64 = 65.536;
 const LOWEST_DEG: f64 = 100.0;
 
 impl Servo {
-    /// How much more a count of error is than at the factory's gain.
+    /// How much more a count of error is than at the model's Position P Gain from the factory, for which the figures of
+    /// the mechanics hold (e-manual, "Position PID Gain").
     fn softness(&self) -> f64 {
-        FACTORY_P / (self.node.table.get(reg::POSITION_P_GAIN) as f64).max(1.0)
+        let [.., factory] = self.fitting.model.gains;
+        f64::from(factory) / (self.node.table.get(reg::POSITION_P_GAIN) as f64).max(1.0)
     }
 
     /// Seconds by which the shaft is late behind its profile: the error by which a proportional controller pulls.

@@ -1,7 +1,7 @@
 use super::instruction::Write;
 
-/// Goal Position of the X series, 4 bytes.
-const GOAL_POSITION: std::ops::Range<u16> = 116..120;
+/// Goal Position of the X series, and its length.
+pub(super) const GOAL_POSITION: (u16, u16) = (116, 4);
 
 /// What passed over the wire so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,14 +27,17 @@ pub struct Counters {
 }
 
 impl Counters {
-    /// Counts a good packet from the host, with the writes in it.
-    pub(super) fn note(&mut self, writes: &[Write<'_>], unheard: bool) {
+    /// Counts a good packet from the host, with the writes in it; `goal` says where a device has its Goal Position.
+    pub(super) fn note(&mut self, writes: &[Write<'_>], unheard: bool, goal: impl Fn(u8) -> u16) {
         self.packets += 1;
         self.unheard += u64::from(unheard);
         let sets_goal = |write: &&Write<'_>| {
-            let end = usize::from(write.address) + write.bytes.len();
-            usize::from(write.address) < usize::from(GOAL_POSITION.end)
-                && end > usize::from(GOAL_POSITION.start)
+            let (from, to) = (
+                usize::from(write.address),
+                usize::from(write.address) + write.bytes.len(),
+            );
+            let goal = usize::from(goal(write.id));
+            from < goal + usize::from(GOAL_POSITION.1) && to > goal
         };
         self.goals += writes.iter().filter(sets_goal).count() as u64;
     }

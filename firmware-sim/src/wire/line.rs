@@ -6,6 +6,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::answer::Slot;
+use super::counters::GOAL_POSITION;
 use super::dispatch::Dispatcher;
 use super::instruction::writes;
 use super::packet::Packet;
@@ -155,7 +156,11 @@ impl Line {
             }
         }
         let writes = writes(packet);
-        self.counters.note(&writes, heard.is_empty());
+        let goal = |id: u8| {
+            let device = heard.iter().find(|device| device.id() == id);
+            device.map_or(GOAL_POSITION.0, |device| device.place(GOAL_POSITION.0))
+        };
+        self.counters.note(&writes, heard.is_empty(), goal);
         if let Some(listener) = &self.trace {
             for write in &writes {
                 // A listener that is gone needs to hear nothing more.

@@ -90,8 +90,8 @@ impl<R: Rig> Execution<'_, R> {
                 return Ok(Some(format!("the {device} has {value} °C")));
             }
         }
-        for (device, value) in devices.iter().zip(found.supply_v) {
-            if holds(supply_v, value, holding) {
+        for ((device, value), bounds) in devices.iter().zip(found.supply_v).zip(supply_v) {
+            if holds(bounds, value, holding) {
                 return Ok(Some(format!("the supply of the {device} is {value:.1} V")));
             }
         }

@@ -6,7 +6,7 @@ use arms::{Arm, Pose};
 use firmware_sim::in_process::{SharedBench, Written};
 use goniod::FaultId;
 use rig::dynamixel::register::{photometer, servo};
-use rig::{ACCELERATION_UNIT_RAD_S2, COUNTS_PER_TURN, Device, VELOCITY_UNIT_RAD_S};
+use rig::{Device, ServoUnits};
 
 use crate::script::Op;
 
@@ -71,11 +71,11 @@ fn sets_off(write: &Written) -> bool {
     else {
         return false;
     };
-    let speed = write.velocity as f64 * VELOCITY_UNIT_RAD_S;
-    let braking = speed * speed / (2.0 * BRAKING_RAD_S2.min(255.0 * ACCELERATION_UNIT_RAD_S2));
-    let way = (goal - write.position).abs() as f64 * std::f64::consts::TAU / COUNTS_PER_TURN;
+    let speed = write.velocity as f64 * ServoUnits::X.velocity_rad_s;
+    let braking = speed * speed / (2.0 * BRAKING_RAD_S2.min(255.0 * ServoUnits::X.acceleration_rad_s2));
+    let way = (goal - write.position).abs() as f64 * std::f64::consts::TAU / ServoUnits::X.counts_per_turn;
     // A count of the encoder, and what rounding does to the braking distance.
-    way > 1.05 * braking + 2.0 * std::f64::consts::TAU / COUNTS_PER_TURN
+    way > 1.05 * braking + 2.0 * std::f64::consts::TAU / ServoUnits::X.counts_per_turn
 }
 
 /// The fault of an emergency stop that was answered and that nobody has acknowledged by its name, or by that of a later

@@ -23,12 +23,26 @@ pub async fn answers<R: Rig>(drive: &mut Drive<R>, device: Device) -> bool {
 }
 
 /// Whether all devices can be read in one transaction, as a run does; told only where they cannot, or not surely. The
-/// servos' indirect addresses are set for that, in their RAM. Moves nothing.
+/// servos' indirect addresses are set for that, in their RAM, or in the EEPROM of a P series. Moves nothing.
 pub async fn together(drive: &mut Drive<Dynamixel>) -> Option<Finding> {
     const CHECK: &str = "bulk read";
     const READS: usize = 20;
     if let Err(error) = drive.rig().map_all().await {
         return Some(Finding::error(CHECK, &error));
+    }
+    let old = Arm::BOTH.map(|arm| drive.rig().axis(arm).lacks_indirect_data());
+    for (arm, lacks) in Arm::BOTH.into_iter().zip(old) {
+        if let Some((firmware, needed)) = lacks {
+            let text = format!(
+                "the {} ({}) has no indirect data at a known place before firmware {needed}, and has {firmware}: its \
+                 state is read register by register, which takes several times as long and is not all of one moment",
+                Device::from(arm),
+                drive.file().arm(arm).model.name,
+            );
+            let remedy =
+                "update its firmware with Dynamixel Wizard 2.0; until then do not use mode = \"fly\"";
+            return Some(Finding::warn(CHECK, text, remedy));
+        }
     }
     let (mut lost, mut last) = (0, None);
     for n in 0..READS {

@@ -1,18 +1,20 @@
 use super::Finding;
-use crate::{Band, Device, Drive, Rig, Surroundings, Suspend};
+use crate::dynamixel::Model;
+use crate::{Band, Device, Drive, Rig, RigFile, Surroundings};
 
 const CHECK: &str = "suspend";
 
-/// What of the surroundings would hold a run by `[suspend]` before its first motion; nothing where none would. Reads what
-/// a run reads, and moves nothing.
+/// What of the surroundings would hold a run by `[suspend]` before its first motion, and a supply that a servo is not made
+/// for; nothing where none would. Reads what a run reads, and moves nothing.
 pub async fn suspend<R: Rig>(drive: &mut Drive<R>) -> Vec<Finding> {
     match drive.surroundings().await {
-        Ok(found) => judged(&found, &drive.file().suspend),
+        Ok(found) => judged(&found, drive.file()),
         Err(error) => vec![Finding::error(CHECK, &error)],
     }
 }
 
-fn judged(found: &Surroundings, bounds: &Suspend) -> Vec<Finding> {
+fn judged(found: &Surroundings, file: &RigFile) -> Vec<Finding> {
+    let bounds = &file.suspend;
     let devices = [Device::Light, Device::Sensor, Device::Photometer];
     let mut findings = Vec::new();
     if bounds.door && found.door_open {
@@ -22,14 +24,16 @@ fn judged(found: &Surroundings, bounds: &Suspend) -> Vec<Finding> {
             "close it, or set suspend.door = false",
         ));
     }
-    for (device, value) in devices.into_iter().zip(found.supply_v) {
+    for (arm, device) in file.arms.iter().zip(devices) {
+        let (value, model) = (found.supply_v[device as usize], arm.model);
         let text = format!("the supply of the {device} is {value:.1} V");
-        findings.extend(held(bounds.supply_v, value, &text, |band| {
+        let held = held(bounds.supply_v[device as usize], value, &text, |band| {
             format!(
-                "raise the supply to {} V at the servo, where it is 12 V by right; or lower suspend.supply_v",
-                band.release
+                "raise the supply to {} V at the servo, where it is {} V by right; or lower suspend.supply_v",
+                band.release, model.supply_v
             )
-        }));
+        });
+        findings.extend(held.or_else(|| outside(value, &text, model)));
     }
     for (device, value) in devices.into_iter().zip(found.temperature_c) {
         let text = format!("the {device} has {value} °C");
@@ -41,6 +45,22 @@ fn judged(found: &Surroundings, bounds: &Suspend) -> Vec<Finding> {
         }));
     }
     findings
+}
+
+/// A supply that a model is not made for.
+fn outside(value_v: f64, text: &str, model: &Model) -> Option<Finding> {
+    let range = model.voltage_v();
+    if range.contains(&value_v) {
+        return None;
+    }
+    let text = format!(
+        "{text}, and the {} takes {} … {} V",
+        model.name,
+        range.start(),
+        range.end()
+    );
+    let remedy = format!("give it the {} V that it is made for", model.supply_v);
+    Some(Finding::fail(CHECK, text, remedy))
 }
 
 /// A value at which a run would be held.
@@ -75,12 +95,11 @@ mod tests {
 
     #[test]
     fn a_supply_of_5_v_is_told_with_what_it_must_be() {
-        let bounds = RigFile::default().suspend;
         let found = Surroundings {
             supply_v: [12.0, 5.0],
             ..sound()
         };
-        let findings = judged(&found, &bounds);
+        let findings = judged(&found, &RigFile::default());
         assert_eq!(findings.len(), 1, "{findings:?}");
         assert!(findings[0].text.contains("sensor servo is 5.0 V"), "{findings:?}");
         let remedy = findings[0].remedy.as_ref().unwrap();
@@ -90,8 +109,31 @@ mod tests {
         );
     }
 
+    #[test]
+    fn a_supply_that_a_model_is_not_made_for_is_told() {
+        let rig = |model: &str| {
+            let text = format!("[light]\nmodel = \"{model}\"\nvelocity_deg_s = 30\n");
+            RigFile::parse(&text, std::path::Path::new("test.toml")).unwrap()
+        };
+        let found = |supply_v| Surroundings {
+            supply_v: [supply_v, 12.0],
+            ..sound()
+        };
+        let text = |model, supply_v| {
+            judged(&found(supply_v), &rig(model))
+                .first()
+                .map(|f| f.text.clone())
+        };
+        let told = text("XM430-W350", 24.0).unwrap();
+        assert!(
+            told.contains("24.0 V, and the XM430-W350 takes 9.5 … 16 V"),
+            "{told}"
+        );
+        assert_eq!(text("XH540-W270", 12.0), None);
+    }
+
     proptest! {
-        /// Nothing is told exactly where a run would not be held.
+        /// Something is told where a run would be held or a servo has a supply that it is not made for, and only there.
         #[test]
         fn prop_a_finding_is_told_where_a_run_would_be_held(
             supply_v in 3.0..20.0f64,
@@ -99,7 +141,9 @@ mod tests {
             door_open in any::<bool>(),
             door in any::<bool>(),
         ) {
-            let bounds = Suspend { door, ..RigFile::default().suspend };
+            let mut file = RigFile::default();
+            file.suspend.door = door;
+            let bounds = file.suspend;
             let found = Surroundings {
                 supply_v: [12.0, supply_v],
                 temperature_c: [30.0, temperature_c, 30.0],
@@ -107,9 +151,10 @@ mod tests {
             };
             let holds = |band: Option<Band>, value| band.is_some_and(|band| band.holds(value, false));
             let held = (door && door_open)
-                || holds(bounds.supply_v, supply_v)
+                || holds(bounds.supply_v[1], supply_v)
+                || !file.arms[1].model.voltage_v().contains(&supply_v)
                 || holds(bounds.temperature_c, temperature_c);
-            prop_assert_eq!(judged(&found, &bounds).is_empty(), !held);
+            prop_assert_eq!(judged(&found, &file).is_empty(), !held);
         }
     }
 }

@@ -1,9 +1,10 @@
 //! Stretches of the control tables that are read at once, and what their bytes mean.
 //!
 //! `dynamixel2` 0.9.1 removes byte stuffing wrongly where a reply contains FF FF FF FD. Every stretch read here is cut
-//! such that its fields cannot spell that: position, goal and velocity are read alone or between small bytes, homing
-//! offset alone. The property tests below try them all.
+//! such that its fields cannot spell that: position, goal and velocity are read alone or between small bytes, limits and
+//! homing offset alone. The property tests below try them all.
 
+use super::model::{Indirect, Series};
 use super::register::{Register, common, photometer, servo};
 use crate::{Counts, DetectorStatus, Exposure, Gain, Phase};
 
@@ -36,8 +37,6 @@ impl Block {
 pub(super) const SETUP: Block = Block::span(common::FIRMWARE_VERSION, common::RETURN_DELAY_TIME);
 /// Drive mode and operating mode.
 pub(super) const MODES: Block = Block::span(servo::DRIVE_MODE, servo::OPERATING_MODE);
-/// Velocity limit, max and min position limit.
-pub(super) const LIMITS: Block = Block::span(servo::VELOCITY_LIMIT, servo::MIN_POSITION_LIMIT);
 /// Moving and moving status.
 pub(super) const MOVING: Block = Block::span(servo::MOVING, servo::MOVING_STATUS);
 /// Status and sequence number of the photometer.
@@ -48,32 +47,40 @@ pub(super) const READING: Block = Block::span(photometer::STATUS, photometer::PR
 /// Temperature and door contact of the photometer.
 pub(super) const CABINET: Block = Block::span(photometer::TEMPERATURE, photometer::DOOR);
 
-/// Registers that the indirect data of a servo show, in this order.
+/// Registers that the indirect data of a servo show, in this order: small bytes between the two positions.
 const STATE_REGISTERS: [Register; 6] = [
+    servo::GOAL_POSITION,
     servo::TORQUE_ENABLE,
     common::HARDWARE_ERROR_STATUS,
     servo::MOVING,
     servo::MOVING_STATUS,
-    servo::GOAL_POSITION,
     servo::PRESENT_POSITION,
 ];
 
+/// Bytes of the state.
+const STATE_LENGTH: usize = 12;
+
 /// The state of a servo as its indirect data show it.
-pub(super) const STATE: Block = Block {
-    address: servo::INDIRECT_DATA_1.address,
-    length: 12,
-};
+pub(super) const fn state_block(indirect: Indirect) -> Block {
+    Block {
+        address: indirect.data,
+        length: STATE_LENGTH,
+    }
+}
 
-/// The indirect addresses behind [`STATE`].
-pub(super) const STATE_MAP: Block = Block {
-    address: servo::INDIRECT_ADDRESS_1.address,
-    length: 2 * STATE.length,
-};
+/// The indirect addresses behind [`state_block`].
+pub(super) const fn state_map_block(indirect: Indirect) -> Block {
+    Block {
+        address: indirect.addresses,
+        length: 2 * STATE_LENGTH,
+    }
+}
 
-/// What the indirect addresses must hold so that [`STATE`] shows the state: one address for each byte.
-pub(super) fn state_map() -> Vec<u8> {
+/// What the indirect addresses must hold so that [`state_block`] shows the state: one address for each byte.
+pub(super) fn state_map(series: &Series) -> Vec<u8> {
     STATE_REGISTERS
         .iter()
+        .map(|&register| series.at(register))
         .flat_map(|register| register.address..register.address + register.size)
         .flat_map(u16::to_le_bytes)
         .collect()
@@ -92,14 +99,14 @@ pub(super) struct State {
     pub(super) position: i32,
 }
 
-/// The state in the bytes of [`STATE`].
+/// The state in the bytes of [`state_block`].
 pub(super) fn state(bytes: &[u8]) -> State {
     State {
-        torque: bytes[0] == 1,
-        hardware_error: bytes[1],
-        moving: bytes[2] == 1,
-        in_position: bytes[3] & 1 == 1,
-        goal: i32_at(bytes, 4),
+        goal: i32_at(bytes, 0),
+        torque: bytes[4] == 1,
+        hardware_error: bytes[5],
+        moving: bytes[6] == 1,
+        in_position: bytes[7] & 1 == 1,
         position: i32_at(bytes, 8),
     }
 }
@@ -175,8 +182,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::dynamixel::MODELS;
 
-    /// Positions of a servo in its multi-turn range (e-manual, "Present Position(132)").
+    /// Positions of a servo in its multi-turn range (e-manual, "Present Position(132)"), which hold those of every model
+    /// within a turn.
     const POSITIONS: std::ops::RangeInclusive<i32> = -1_048_575..=1_048_575;
 
     fn stuffs(bytes: &[u8]) -> bool {
@@ -193,10 +202,10 @@ mod tests {
         #[test]
         fn prop_state_of_a_servo_never_stuffs(
             torque in 0u8..2, error in 0u8..64, moving in 0u8..2, status in 0u8..64,
-            goal in 0i32..4096, position in POSITIONS,
+            goal in POSITIONS, position in POSITIONS,
         ) {
-            let bytes = joined(&[&[torque, error, moving, status], &goal.to_le_bytes(), &position.to_le_bytes()]);
-            prop_assert_eq!(bytes.len(), STATE.length);
+            let bytes = joined(&[&goal.to_le_bytes(), &[torque, error, moving, status], &position.to_le_bytes()]);
+            prop_assert_eq!(bytes.len(), STATE_LENGTH);
             prop_assert!(!stuffs(&bytes), "{:02X?}", bytes);
             let state = state(&bytes);
             prop_assert_eq!((state.goal, state.position), (goal, position));
@@ -210,13 +219,10 @@ mod tests {
         #[test]
         fn prop_setup_of_a_servo_never_stuffs(
             firmware in 0u8..255, id in 0u8..253, baud in 0u8..8, delay in 0u8..255,
-            drive in 0u8..16, mode in 0u8..17, velocity in 0u32..1024, limits in (0u32..4096, 0u32..4096),
+            drive in 0u8..16, mode in 0u8..17,
         ) {
             prop_assert!(!stuffs(&[firmware, id, baud, delay]));
             prop_assert!(!stuffs(&[drive, mode]));
-            let bytes = joined(&[&velocity.to_le_bytes(), &limits.0.to_le_bytes(), &limits.1.to_le_bytes()]);
-            prop_assert_eq!(bytes.len(), LIMITS.length);
-            prop_assert!(!stuffs(&bytes));
         }
 
         /// Bytes that docs/photometer.md leaves unnamed read 0; every number has 24 bits.
@@ -243,11 +249,11 @@ mod tests {
 
     /// The position at every value, not only at random ones.
     #[test]
-    fn no_position_stuffs_behind_any_goal_that_ends_a_turn() {
-        for goal in [0i32, 253, 255, 4095] {
+    fn no_position_stuffs_behind_any_goal_that_ends_in_ones() {
+        for goal in [0i32, 253, 255, 4095, -1, -513, -131_073] {
             for position in POSITIONS {
                 let [g, p] = [goal.to_le_bytes(), position.to_le_bytes()];
-                let bytes = [0, 0, 0, 0, g[0], g[1], g[2], g[3], p[0], p[1], p[2], p[3]];
+                let bytes = [g[0], g[1], g[2], g[3], 0, 0, 0, 0, p[0], p[1], p[2], p[3]];
                 assert!(!stuffs(&bytes), "goal {goal}, position {position}");
             }
         }
@@ -255,20 +261,25 @@ mod tests {
 
     #[test]
     fn the_neighbours_that_are_avoided_do_stuff() {
-        let velocity_and_position = joined(&[&(-1i32).to_le_bytes(), &(-3i32).to_le_bytes()]);
-        assert!(stuffs(&velocity_and_position));
+        let neighbours = joined(&[&(-1i32).to_le_bytes(), &(-3i32).to_le_bytes()]);
+        assert!(
+            stuffs(&neighbours),
+            "velocity and position, goal and position, two limits"
+        );
     }
 
     #[test]
     fn the_map_names_each_byte_of_the_state() {
-        let map = state_map();
-        assert_eq!(map.len(), STATE_MAP.length);
-        let addresses: Vec<u16> = map.chunks(2).map(|c| u16::from_le_bytes([c[0], c[1]])).collect();
-        assert_eq!(
-            addresses,
-            [64, 70, 122, 123, 116, 117, 118, 119, 132, 133, 134, 135]
-        );
-        assert!(!stuffs(&map));
+        for model in MODELS {
+            let map = state_map(model.series);
+            let area = model.series.indirect[0];
+            assert_eq!(map.len(), state_map_block(area).length);
+            assert!(usize::from(area.cells) >= STATE_LENGTH, "{}", model.name);
+            assert!(!stuffs(&map));
+            let addresses: Vec<u16> = map.chunks(2).map(|c| u16::from_le_bytes([c[0], c[1]])).collect();
+            let x = [116, 117, 118, 119, 64, 70, 122, 123, 132, 133, 134, 135];
+            assert_eq!(addresses, x.map(|address| model.series.place(address)));
+        }
     }
 
     #[test]

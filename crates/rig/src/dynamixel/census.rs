@@ -1,7 +1,8 @@
 use std::path::Path;
 
 use super::line::{Cause, Line};
-use super::register::{MODELS, PHOTOMETER_MODEL};
+use super::model::Model;
+use super::register::PHOTOMETER_MODEL;
 use crate::{BusSettings, RigError};
 
 /// A device that answered a ping to all.
@@ -21,8 +22,7 @@ impl Heard {
         if self.model == PHOTOMETER_MODEL {
             return Some("photometer");
         }
-        let model = MODELS.iter().find(|&&(_, number)| number == self.model);
-        model.map(|&(name, _)| name)
+        Model::numbered(self.model).map(|model| model.name)
     }
 }
 

@@ -1,6 +1,7 @@
 use super::block::{Block, i32_at};
 use super::bus::Bus;
 use super::line::{Cause, Failure, PING, PING_REPLY, Reply, Request};
+use super::model::Series;
 use super::register::{Register, common};
 use crate::{Device, RigError};
 
@@ -11,6 +12,7 @@ pub(super) mod instruction {
     pub(crate) const REBOOT: u8 = 0x08;
     pub(crate) const SYNC_WRITE: u8 = 0x83;
     pub(crate) const BULK_READ: u8 = 0x92;
+    pub(crate) const BULK_WRITE: u8 = 0x93;
 }
 
 /// Id that addresses all devices.
@@ -25,9 +27,16 @@ pub(super) struct Node {
     pub(super) bus: Bus,
     pub(super) device: Device,
     pub(super) id: u8,
+    /// Its control table; none of a device that has its registers where the X series has those of the same name.
+    pub(super) series: Option<&'static Series>,
 }
 
 impl Node {
+    /// Where this device has what the X series has at an address.
+    pub(super) fn place(&self, address: u16) -> u16 {
+        self.series.map_or(address, |series| series.place(address))
+    }
+
     /// Reads bytes; a hardware error that the device announces is an error.
     pub(super) async fn read(&self, block: Block) -> Result<Vec<u8>, RigError> {
         let reply = self.healthy(self.ask(block).await).await?;
@@ -45,9 +54,15 @@ impl Node {
         self.healthy(reply).await.map(|_| ())
     }
 
+    /// Writes the bytes of a block; a hardware error that the device announces is an error.
+    pub(super) async fn write_block(&self, block: Block, bytes: &[u8]) -> Result<(), RigError> {
+        let reply = self.tell_at(block.address, bytes).await;
+        self.healthy(reply).await.map(|_| ())
+    }
+
     /// Reads bytes of a device that may be ill: what stops a rig goes on regardless.
     pub(super) async fn ask(&self, block: Block) -> Result<Reply, RigError> {
-        let mut parameters = block.address.to_le_bytes().to_vec();
+        let mut parameters = self.place(block.address).to_le_bytes().to_vec();
         parameters.extend((block.length as u16).to_le_bytes());
         self.request(instruction::READ, parameters, block.length).await
     }
@@ -60,7 +75,11 @@ impl Node {
 
     /// Writes to a device that may be ill.
     pub(super) async fn tell(&self, register: Register, bytes: &[u8]) -> Result<Reply, RigError> {
-        let mut parameters = register.address.to_le_bytes().to_vec();
+        self.tell_at(register.address, bytes).await
+    }
+
+    async fn tell_at(&self, address: u16, bytes: &[u8]) -> Result<Reply, RigError> {
+        let mut parameters = self.place(address).to_le_bytes().to_vec();
         parameters.extend(bytes);
         self.request(instruction::WRITE, parameters, 0).await
     }
@@ -119,10 +138,10 @@ impl Node {
         RigError::Mismatch {
             device: self.device,
             id: self.id,
-            differences: vec![
-                "it answers pings and no reads, so its status return level is 0: write 2 to address 68"
-                    .to_owned(),
-            ],
+            differences: vec![format!(
+                "it answers pings and no reads, so its status return level is 0: write 2 to address {}",
+                self.place(common::STATUS_RETURN_LEVEL.address)
+            )],
         }
     }
 

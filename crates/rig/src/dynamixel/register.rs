@@ -1,6 +1,7 @@
 //! Addresses of the control tables, as typed constants.
 //!
-//! Servos: ROBOTIS e-manual, XM430-W350 and XM540-W270, "Control Table"; the whole X series has the same addresses.
+//! Servos: ROBOTIS e-manual, XM430-W350 and XM540-W270, "Control Table". Registers are named by where the X series has
+//! them; [`Series::at`](super::Series::at) says where another series does.
 //! Photometer: docs/photometer.md.
 
 /// One entry of a control table.
@@ -17,16 +18,6 @@ pub struct Register {
 const fn register(address: u16, size: u16, name: &'static str) -> Register {
     Register { address, size, name }
 }
-
-/// Model names and numbers of the servos that a rig may have (e-manual, "Model Number" of each page).
-pub const MODELS: [(&str, u16); 6] = [
-    ("XM430-W350", 1020),
-    ("XM430-W210", 1030),
-    ("XM540-W270", 1120),
-    ("XM540-W150", 1130),
-    ("XH540-W270", 1100),
-    ("XH540-W150", 1110),
-];
 
 /// Model number of the photometer node (docs/photometer.md).
 pub const PHOTOMETER_MODEL: u16 = 0x4750;
@@ -64,7 +55,7 @@ pub mod common {
     pub const BUS_WATCHDOG: Register = register(98, 1, "Bus Watchdog");
 }
 
-/// Control table of the X-series servos.
+/// Control table of the servos, with the units of the X series.
 pub mod servo {
     use super::{Register, register};
 
@@ -74,6 +65,8 @@ pub mod servo {
     pub const OPERATING_MODE: Register = register(11, 1, "Operating Mode");
     /// Homing Offset, counts, signed; EEPROM.
     pub const HOMING_OFFSET: Register = register(20, 4, "Homing Offset");
+    /// Acceleration Limit; EEPROM. Not every model has it.
+    pub const ACCELERATION_LIMIT: Register = register(40, 4, "Acceleration Limit");
     /// Velocity Limit, 0.229 rpm; EEPROM.
     pub const VELOCITY_LIMIT: Register = register(44, 4, "Velocity Limit");
     /// Max Position Limit, counts; EEPROM.
@@ -104,10 +97,6 @@ pub mod servo {
     pub const PRESENT_INPUT_VOLTAGE: Register = register(144, 2, "Present Input Voltage");
     /// Present Temperature, °C.
     pub const PRESENT_TEMPERATURE: Register = register(146, 1, "Present Temperature");
-    /// First of the 28 Indirect Addresses of 2 bytes each.
-    pub const INDIRECT_ADDRESS_1: Register = register(168, 2, "Indirect Address 1");
-    /// First of the 28 Indirect Data bytes.
-    pub const INDIRECT_DATA_1: Register = register(224, 1, "Indirect Data 1");
 }
 
 /// Control table of the photometer node (docs/photometer.md).

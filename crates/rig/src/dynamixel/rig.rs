@@ -6,6 +6,7 @@ use arms::{Arm, Pose};
 use super::block::{self, Block};
 use super::bus::Bus;
 use super::line::Request;
+use super::model::Indirect;
 use super::node::{BROADCAST, Node, instruction};
 use super::photometer::Photometer;
 use super::register::{photometer, servo};
@@ -33,28 +34,30 @@ impl Dynamixel {
     /// The port is missing, locked by another program, not permitted or no serial port.
     pub fn open(port: &Path, file: &RigFile) -> Result<Self, RigError> {
         let bus = Bus::open(port, &file.bus)?;
-        let node = |device, id| Node {
+        let node = |device, id, series| Node {
             bus: bus.clone(),
             device,
             id,
+            series,
         };
         let servo = |arm: Arm| {
             let settings = file.arm(arm).clone();
             Servo {
-                node: node(arm.into(), settings.id),
+                node: node(arm.into(), settings.id, Some(settings.model.series)),
                 settings,
                 limits: file.envelope.limits(arm),
                 watchdog: file.motion.watchdog,
                 latency: file.bus.latency,
                 estop: file.motion.estop,
-                mapped: false,
+                mapped: None,
+                firmware: None,
                 engaged: false,
             }
         };
         Ok(Self {
             servos: Arm::BOTH.map(servo),
             photometer: Photometer {
-                node: node(Device::Photometer, file.photometer.id),
+                node: node(Device::Photometer, file.photometer.id, None),
                 watchdog: file.motion.watchdog,
             },
             simulated: None,
@@ -75,17 +78,22 @@ impl Dynamixel {
     }
 
     /// State of both servos, and a block of the photometer that begins with its status, in one transaction.
-    async fn bulk(&mut self, photometer: Block) -> Result<(Snapshot, Vec<u8>), RigError> {
+    async fn bulk(
+        &mut self,
+        states: [Indirect; 2],
+        photometer: Block,
+    ) -> Result<(Snapshot, Vec<u8>), RigError> {
         let [light, sensor] = [&self.servos[0].node, &self.servos[1].node];
+        let [light_state, sensor_state] = states.map(block::state_block);
         let parts = [
-            (light, block::STATE),
-            (sensor, block::STATE),
+            (light, light_state),
+            (sensor, sensor_state),
             (&self.photometer.node, photometer),
         ];
         let mut parameters = Vec::new();
         for (node, block) in parts {
             parameters.push(node.id);
-            parameters.extend(block.address.to_le_bytes());
+            parameters.extend(node.place(block.address).to_le_bytes());
             parameters.extend((block.length as u16).to_le_bytes());
         }
         let request = Request {
@@ -122,8 +130,8 @@ impl Dynamixel {
 
     /// Both servos and a block of the photometer that begins with its status, in as few transactions as possible.
     async fn look(&mut self, photometer: Block) -> Result<(Snapshot, Vec<u8>), RigError> {
-        if self.servos.iter().all(|servo| servo.mapped) {
-            return self.bulk(photometer).await;
+        if let [Some(light), Some(sensor)] = self.servos.each_ref().map(|servo| servo.mapped) {
+            return self.bulk([light, sensor], photometer).await;
         }
         let [light, sensor] = &mut self.servos;
         use crate::Actuator as _;
@@ -164,17 +172,31 @@ impl Rig for Dynamixel {
                 device: servo.node.device,
             });
         }
-        let mut parameters = servo::GOAL_POSITION.address.to_le_bytes().to_vec();
-        parameters.extend(servo::GOAL_POSITION.size.to_le_bytes());
-        for arm in Arm::BOTH {
+        let goal = servo::GOAL_POSITION;
+        let [light, sensor] = self.servos.each_ref().map(|servo| servo.node.place(goal.address));
+        // One packet also where the two have their goals at different addresses.
+        let together = light == sensor;
+        let mut parameters = Vec::new();
+        if together {
+            parameters.extend(light.to_le_bytes());
+            parameters.extend(goal.size.to_le_bytes());
+        }
+        for (arm, address) in Arm::BOTH.into_iter().zip([light, sensor]) {
             let servo = &self.servos[arm as usize];
             let counts = servo.settings.axis.counts(goals.angle(arm)).round() as i32;
             parameters.push(servo.node.id);
+            if !together {
+                parameters.extend(address.to_le_bytes());
+                parameters.extend(goal.size.to_le_bytes());
+            }
             parameters.extend(counts.to_le_bytes());
         }
         let request = Request {
             id: BROADCAST,
-            instruction: instruction::SYNC_WRITE,
+            instruction: match together {
+                true => instruction::SYNC_WRITE,
+                false => instruction::BULK_WRITE,
+            },
             parameters,
             replies: Vec::new(),
         };

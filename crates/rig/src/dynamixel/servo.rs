@@ -1,25 +1,18 @@
-use std::f64::consts::TAU;
 use std::time::Duration;
 
 use arms::{ArmAngle, Limits, Profile};
 
-use super::block::{self, Block, State, i32_at, u32_of};
+use super::block::{self, Block, State, i32_at};
+use super::model::{Indirect, Model};
 use super::node::Node;
-use super::register::{MODELS, common, servo};
-use crate::axis::{ACCELERATION_UNIT_RAD_S2, COUNTS_PER_TURN, VELOCITY_UNIT_RAD_S};
+use super::register::{Register, common, servo};
 use crate::{Actuator, ArmSettings, Estop, Identity, Location, RigError};
 
-/// An arm that is further from where it stood before its torque came on has moved, counts (about 1°).
-const STILL: i32 = 12;
-
-/// First firmware with the bus watchdog and the drive mode register as used here (e-manual, "Bus Watchdog(98)").
-const FIRMWARE_MIN: u8 = 38;
+/// A servo that is further from where it stood before its torque came on has moved, turns of it (about 1°).
+const STILL: f64 = 12.0 / 4096.0;
 
 /// Value of Bus Watchdog once it has tripped (e-manual, "Bus Watchdog(98)").
 const TRIPPED: u8 = 255;
-
-/// Homing offsets beyond this are ignored in position mode (e-manual, "Homing Offset(20)").
-const HOMING_OFFSET_MAX: i32 = 1024;
 
 /// The servo of one arm.
 #[derive(Debug)]
@@ -30,8 +23,10 @@ pub struct Servo {
     pub(super) watchdog: Duration,
     pub(super) latency: Duration,
     pub(super) estop: Estop,
-    /// The indirect data show the state.
-    pub(super) mapped: bool,
+    /// Where the indirect data show the state, once they do.
+    pub(super) mapped: Option<Indirect>,
+    /// Its firmware, where the place of its indirect data depends on it and was looked for.
+    pub(super) firmware: Option<u8>,
     pub(super) engaged: bool,
 }
 
@@ -66,18 +61,52 @@ impl Servo {
         })
     }
 
-    /// Points the indirect data at the state. A servo may refuse that while its torque is on; then the state is read
-    /// register by register.
+    /// Its model, as the rig file says.
+    fn model(&self) -> &'static Model {
+        self.settings.model
+    }
+
+    /// Where this servo has a register, for a message.
+    fn address(&self, register: Register) -> u16 {
+        self.node.place(register.address)
+    }
+
+    /// Points the indirect data at the state. A servo may refuse that while its torque is on, and one of old firmware may
+    /// have no indirect data; then the state is read register by register.
     pub(crate) async fn map(&mut self) -> Result<(), RigError> {
-        let wanted = block::state_map();
-        self.mapped = self.node.read(block::STATE_MAP).await? == wanted;
-        if !self.mapped {
-            match self.node.write(servo::INDIRECT_ADDRESS_1, &wanted).await {
-                Err(RigError::Refused { .. }) => {}
-                result => result.map(|()| self.mapped = true)?,
+        self.mapped = None;
+        let Some(indirect) = self.indirect().await? else {
+            return Ok(());
+        };
+        let wanted = block::state_map(self.model().series);
+        let map = block::state_map_block(indirect);
+        if self.node.read(map).await? != wanted {
+            match self.node.write_block(map, &wanted).await {
+                Err(RigError::Refused { .. }) => return Ok(()),
+                result => result?,
             }
         }
+        self.mapped = Some(indirect);
         Ok(())
+    }
+
+    /// Its indirect data, where its firmware has them at a known place.
+    async fn indirect(&mut self) -> Result<Option<Indirect>, RigError> {
+        let series = self.model().series;
+        if series.indirect_from_firmware == 0 {
+            return Ok(series.indirect(0));
+        }
+        let firmware = self.node.read_u8(common::FIRMWARE_VERSION).await?;
+        self.firmware = Some(firmware);
+        Ok(series.indirect(firmware))
+    }
+
+    /// Its firmware and the first one that has indirect data at a known place, where it was found to be older.
+    pub(crate) fn lacks_indirect_data(&self) -> Option<(u8, u8)> {
+        let needed = self.model().series.indirect_from_firmware;
+        self.firmware
+            .filter(|&firmware| firmware < needed)
+            .map(|firmware| (firmware, needed))
     }
 
     /// The goal at which a servo that moves comes to rest on its profile.
@@ -86,11 +115,11 @@ impl Servo {
         let velocity = self.node.ask_i32(servo::PRESENT_VELOCITY).await?;
         let heading = f64::from(self.node.ask_i32(servo::GOAL_POSITION).await?);
         let position = self.node.ask_i32(servo::PRESENT_POSITION).await?;
-        let counts = |rad: f64| rad * COUNTS_PER_TURN / TAU;
-        let v = counts(f64::from(velocity) * VELOCITY_UNIT_RAD_S);
+        let units = self.settings.axis.units;
+        let v = units.counts(f64::from(velocity) * units.velocity_rad_s);
         let braking = match acceleration {
             0 => 0.0,
-            units => v * v / (2.0 * counts(f64::from(units) * ACCELERATION_UNIT_RAD_S2)),
+            of => v * v / (2.0 * units.counts(f64::from(of) * units.acceleration_rad_s2)),
         };
         // The arm has gone on since its position was read; a goal too near would make it swing back.
         let ahead = braking + v.abs() * self.latency.as_secs_f64();
@@ -118,7 +147,7 @@ impl Servo {
     /// Restarts the servo: it answers, then is deaf for a while, and has no torque and no profile afterwards.
     pub(crate) async fn reboot(&mut self) -> Result<(), RigError> {
         self.engaged = false;
-        self.mapped = false;
+        self.mapped = None;
         self.node.reboot().await
     }
 
@@ -126,8 +155,8 @@ impl Servo {
     async fn differences(&self) -> Result<(Identity, Vec<String>), RigError> {
         let model = self.node.read(Block::of(common::MODEL_NUMBER)).await?;
         let model = u16::from_le_bytes([model[0], model[1]]);
-        let known = MODELS.iter().find(|&&(_, number)| number == model);
-        let name = known.map_or_else(|| format!("unknown model {model}"), |&(name, _)| name.to_owned());
+        let known = Model::numbered(model);
+        let name = known.map_or_else(|| format!("unknown model {model}"), |known| known.name.to_owned());
         let setup = self.node.read(block::SETUP).await?;
         let (firmware, return_delay_us) = (setup[0], u64::from(setup[3]) * 2);
         let identity = Identity {
@@ -137,18 +166,17 @@ impl Servo {
         };
         let mut differences = Vec::new();
         let settings = &self.settings;
-        if name != settings.model {
+        if known != Some(settings.model) {
             differences.push(format!(
                 "it is {name}, the rig file says {}: correct `model` or the wiring",
-                settings.model
+                settings.model.name
             ));
             // What an unknown device's other registers mean is anyone's guess.
             return Ok((identity, differences));
         }
-        if firmware < FIRMWARE_MIN {
-            differences.push(format!(
-                "firmware {firmware} is older than {FIRMWARE_MIN}: update it"
-            ));
+        let oldest = settings.model.series.firmware_min;
+        if firmware < oldest {
+            differences.push(format!("firmware {firmware} is older than {oldest}: update it"));
         }
         let expected = settings.return_delay.as_micros() as u64;
         if return_delay_us != expected {
@@ -180,37 +208,48 @@ impl Servo {
         }
         let offset = self.node.read(Block::of(servo::HOMING_OFFSET)).await?;
         let offset = i32_at(&offset, 0);
-        if offset.abs() > HOMING_OFFSET_MAX {
+        let most = self.model().homing_offset_max();
+        if offset.unsigned_abs() > most.unsigned_abs() {
             differences.push(format!(
-                "homing offset is {offset}, which position mode ignores beyond ±{HOMING_OFFSET_MAX}: write 0 to \
-                 address 20 and put the offset into `zero_deg`"
+                "homing offset is {offset}, which position mode ignores beyond ±{most}: write 0 to address 20 and put \
+                 the offset into `zero_deg`"
             ));
         }
         let level = self.node.read_u8(common::STATUS_RETURN_LEVEL).await?;
         if level != 2 {
             differences.push(format!(
-                "status return level is {level}, so writes are not acknowledged: write 2 to address 68"
+                "status return level is {level}, so writes are not acknowledged: write 2 to address {}",
+                self.address(common::STATUS_RETURN_LEVEL)
             ));
         }
         Ok(())
     }
 
     async fn compare_limits(&self, differences: &mut Vec<String>) -> Result<(), RigError> {
-        let bytes = self.node.read(block::LIMITS).await?;
-        let at = |register| u32_of(&bytes, block::LIMITS, register);
         let axis = self.settings.axis;
-        let [velocity, _] = axis.profile_registers(self.settings.profile);
-        let limit = at(servo::VELOCITY_LIMIT);
-        if velocity > limit {
-            let allowed = (f64::from(limit) * VELOCITY_UNIT_RAD_S / axis.gear).to_degrees();
+        let [velocity, acceleration] = axis.profile_registers(self.settings.profile);
+        let limit = self.read_i32(servo::VELOCITY_LIMIT).await?;
+        if i64::from(velocity) > i64::from(limit) {
+            let allowed = (f64::from(limit) * axis.units.velocity_rad_s / axis.gear).to_degrees();
             differences.push(format!(
                 "velocity limit is {limit}, the arm's speed needs {velocity}: lower `velocity_deg_s` to {allowed:.3} \
                  or raise address 44"
             ));
         }
+        if self.model().acceleration_limit.is_some() {
+            let limit = self.read_i32(servo::ACCELERATION_LIMIT).await?;
+            if i64::from(acceleration) > i64::from(limit) {
+                let allowed = (f64::from(limit) * axis.units.acceleration_rad_s2 / axis.gear).to_degrees();
+                differences.push(format!(
+                    "acceleration limit is {limit}, the arm's acceleration needs {acceleration}: lower \
+                     `acceleration_deg_s2` to {allowed:.3} or raise address 40"
+                ));
+            }
+        }
         let ends = [self.limits.min, self.limits.max].map(|end| axis.counts(end).round() as i64);
         let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-        let (min, max) = (at(servo::MIN_POSITION_LIMIT), at(servo::MAX_POSITION_LIMIT));
+        let min = self.read_i32(servo::MIN_POSITION_LIMIT).await?;
+        let max = self.read_i32(servo::MAX_POSITION_LIMIT).await?;
         if low < i64::from(min) || high > i64::from(max) {
             differences.push(format!(
                 "position limits are {min} … {max}, the arm's limits need {low} … {high}: narrow `min_deg` and \
@@ -218,6 +257,11 @@ impl Servo {
             ));
         }
         Ok(())
+    }
+
+    async fn read_i32(&self, register: Register) -> Result<i32, RigError> {
+        let bytes = self.node.read(Block::of(register)).await?;
+        Ok(i32_at(&bytes, 0))
     }
 }
 
@@ -257,7 +301,8 @@ impl Actuator for Servo {
         self.node.write(servo::GOAL_POSITION, &present).await?;
         self.node.write(servo::TORQUE_ENABLE, &[1]).await?;
         let after = self.state().await?;
-        let near = |counts: i32| (counts - before.position).abs() <= STILL;
+        let still = STILL * self.settings.axis.units.counts_per_turn;
+        let near = |counts: i32| (f64::from(counts) - f64::from(before.position)).abs() <= still;
         if !after.torque || !near(after.goal) || !near(after.position) {
             self.node.tell(servo::TORQUE_ENABLE, &[0]).await?;
             return Err(RigError::Moved {
@@ -292,8 +337,8 @@ impl Actuator for Servo {
     }
 
     async fn location(&mut self) -> Result<Location, RigError> {
-        if self.mapped {
-            let state = block::state(&self.node.ask(block::STATE).await?.parameters);
+        if let Some(indirect) = self.mapped {
+            let state = block::state(&self.node.ask(block::state_block(indirect)).await?.parameters);
             // After a restart the map is lost and everything reads 0.
             if state.torque {
                 return Ok(self.place(state));

@@ -9,11 +9,7 @@ use super::source::Source;
 use super::{
     Approach, ArmSettings, BusSettings, Estop, MotionSettings, PhotometerSettings, Port, RigFile, Visits,
 };
-use crate::axis::{
-    ACCELERATION_REGISTER_MAX, ACCELERATION_UNIT_RAD_S2, COUNTS_PER_TURN, VELOCITY_REGISTER_MAX,
-    VELOCITY_UNIT_RAD_S,
-};
-use crate::dynamixel::{BAUD_RATES, MODELS};
+use crate::dynamixel::{BAUD_RATES, MODELS, Model};
 use crate::{Axis, Calibration, Lamp, RigError};
 
 mod calibration;
@@ -24,14 +20,15 @@ pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
     let raw = source.raw(RigFile::BUILT_IN)?;
     let light = arm(source, "light", &raw.light)?;
     let sensor = arm(source, "sensor", &raw.sensor)?;
+    let bus = bus(source, &raw.bus, [light.model, sensor.model])?;
     let separation = source.within(
         "envelope.separation_deg",
         &raw.envelope.separation_deg,
         0.0..=60.0,
     )?;
     let envelope = Envelope {
-        light: limits(source, "light", &raw.light, light.axis)?,
-        sensor: limits(source, "sensor", &raw.sensor, sensor.axis)?,
+        light: limits(source, "light", &raw.light, &light)?,
+        sensor: limits(source, "sensor", &raw.sensor, &sensor)?,
         separation_rad: separation.to_radians(),
         can_pass: raw.envelope.can_pass,
     };
@@ -50,14 +47,14 @@ pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
         }
     }
     Ok(RigFile {
-        bus: bus(source, &raw.bus)?,
+        bus,
+        suspend: suspend::suspend(source, &raw.suspend, [light.model, sensor.model])?,
         arms: [light, sensor],
         motion: motion(source, &raw.motion, &envelope)?,
         photometer,
         calibration,
         visits,
         certificates: calibration::certificates(source, &raw.calibration)?,
-        suspend: suspend::suspend(source, &raw.suspend)?,
         uncertainty,
         fingerprint: source.fingerprint(RigFile::BUILT_IN)?,
         envelope,
@@ -81,19 +78,27 @@ fn id(source: &Source<'_>, key: &str, value: &Spanned<i64>) -> Result<u8, RigErr
     source.within(key, value, 0..=252).map(|id| id as u8)
 }
 
-fn bus(source: &Source<'_>, raw: &RawBus) -> Result<BusSettings, RigError> {
+fn bus(source: &Source<'_>, raw: &RawBus, models: [&Model; 2]) -> Result<BusSettings, RigError> {
     let port = match raw.port.get_ref().as_str() {
         "sim" => Port::Sim,
         "" => return Err(source.refuse("bus.port", &raw.port, "empty", "\"sim\" or a serial port")),
         path => Port::Path(PathBuf::from(path)),
     };
-    let Some(&(_, baud)) = BAUD_RATES
+    let Some(&(code, baud)) = BAUD_RATES
         .iter()
         .find(|(_, baud)| i64::from(*baud) == *raw.baud.get_ref())
     else {
         let rates: Vec<_> = BAUD_RATES.iter().map(|(_, baud)| baud.to_string()).collect();
         return Err(source.refuse("bus.baud", &raw.baud, raw.baud.get_ref(), rates.join(", ")));
     };
+    if let Some(model) = models.iter().find(|model| code > model.series.baud_code_max) {
+        let rates = BAUD_RATES
+            .iter()
+            .filter(|(code, _)| *code <= model.series.baud_code_max);
+        let rates: Vec<_> = rates.map(|(_, baud)| baud.to_string()).collect();
+        let allowed = format!("{} with an {}", rates.join(", "), model.name);
+        return Err(source.refuse("bus.baud", &raw.baud, baud, allowed));
+    }
     Ok(BusSettings {
         port,
         baud,
@@ -105,22 +110,31 @@ fn bus(source: &Source<'_>, raw: &RawBus) -> Result<BusSettings, RigError> {
 
 fn arm(source: &Source<'_>, table: &str, raw: &RawArm) -> Result<ArmSettings, RigError> {
     let key = |key: &str| format!("{table}.{key}");
-    let models: Vec<_> = MODELS.iter().map(|&(name, number)| (name, number)).collect();
-    source.one_of(&key("model"), &raw.model, &models)?;
+    let model = Model::named(raw.model.get_ref()).ok_or_else(|| {
+        let allowed: Vec<_> = MODELS.iter().map(|model| format!("\"{}\"", model.name)).collect();
+        let found = format!("\"{}\"", raw.model.get_ref());
+        source.refuse(&key("model"), &raw.model, found, allowed.join(", "))
+    })?;
     if ![1, -1].contains(raw.sign.get_ref()) {
         return Err(source.refuse(&key("sign"), &raw.sign, raw.sign.get_ref(), "1, -1"));
     }
     let gear = source.within(&key("gear"), &raw.gear, 0.1..=20.0)?;
+    let units = model.units();
+    let zeros = match model.series.centred {
+        true => -180.0..=180.0,
+        false => 0.0..=360.0,
+    };
     let axis = Axis {
         sign: if *raw.sign.get_ref() > 0 { 1.0 } else { -1.0 },
-        zero_count: source.within(&key("zero_deg"), &raw.zero_deg, 0.0..=360.0)? / 360.0 * COUNTS_PER_TURN,
+        zero_count: source.within(&key("zero_deg"), &raw.zero_deg, zeros)? / 360.0 * units.counts_per_turn,
         gear,
+        units,
     };
-    let unit = (VELOCITY_UNIT_RAD_S / gear).to_degrees();
-    let velocity = register_range(unit, VELOCITY_REGISTER_MAX);
+    let unit = (units.velocity_rad_s / gear).to_degrees();
+    let velocity = register_range(unit, units.velocity_max);
     let velocity = source.within(&key("velocity_deg_s"), &raw.velocity_deg_s, velocity)?;
-    let unit = (ACCELERATION_UNIT_RAD_S2 / gear).to_degrees();
-    let acceleration = register_range(unit, ACCELERATION_REGISTER_MAX);
+    let unit = (units.acceleration_rad_s2 / gear).to_degrees();
+    let acceleration = register_range(unit, units.acceleration_max);
     let acceleration = source.within(
         &key("acceleration_deg_s2"),
         &raw.acceleration_deg_s2,
@@ -137,7 +151,7 @@ fn arm(source: &Source<'_>, table: &str, raw: &RawArm) -> Result<ArmSettings, Ri
     }
     Ok(ArmSettings {
         id: id(source, &key("id"), &raw.id)?,
-        model: raw.model.get_ref().clone(),
+        model,
         axis,
         profile: axis.quantised(Profile {
             velocity_rad_s: velocity.to_radians(),
@@ -154,19 +168,17 @@ fn register_range(unit: f64, max: u32) -> std::ops::RangeInclusive<f64> {
 }
 
 /// Limits of an arm, which must also lie within the single turn of the servo's position mode.
-fn limits(source: &Source<'_>, table: &str, raw: &RawArm, axis: Axis) -> Result<Limits, RigError> {
+fn limits(source: &Source<'_>, table: &str, raw: &RawArm, arm: &ArmSettings) -> Result<Limits, RigError> {
+    let (first, last) = arm.model.positions().into_inner();
+    let turn = f64::from(first)..=f64::from(last);
     for (key, value) in [("min_deg", &raw.min_deg), ("max_deg", &raw.max_deg)] {
         let key = format!("{table}.{key}");
         let deg = source.within(&key, value, -90.0..=90.0)?;
-        let count = axis.counts(ArmAngle::from_deg(deg)).round();
-        if !(0.0..COUNTS_PER_TURN).contains(&count) {
+        let count = arm.axis.counts(ArmAngle::from_deg(deg)).round();
+        if !turn.contains(&count) {
             let found = format!("{deg}, which is servo count {count}");
-            return Err(source.refuse(
-                &key,
-                value,
-                found,
-                "servo counts 0 … 4095 after zero_deg, sign and gear",
-            ));
+            let allowed = format!("servo counts {first} … {last} after zero_deg, sign and gear");
+            return Err(source.refuse(&key, value, found, allowed));
         }
     }
     let limits = Limits {

@@ -100,7 +100,7 @@ pub(super) struct RawCalibration {
 pub(super) struct RawSuspend {
     pub(super) every_s: Spanned<f64>,
     pub(super) temperature_c: Spanned<[f64; 2]>,
-    pub(super) supply_v: Spanned<[f64; 2]>,
+    pub(super) supply_v: Spanned<toml::Value>,
     pub(super) lamp_percent: Spanned<[f64; 2]>,
     pub(super) disk_mb: Spanned<[f64; 2]>,
     pub(super) door: bool,

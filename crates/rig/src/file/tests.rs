@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use super::*;
+use crate::dynamixel::MODELS;
 
 fn parse(text: &str) -> Result<RigFile, RigError> {
     RigFile::parse(text, Path::new("bench.toml"))
@@ -55,6 +56,10 @@ fn errors_say_where_and_what_is_allowed() {
             "bench.toml, line 2: bus.baud is 9600, allowed: 57600, 115200, 1000000, 2000000, 3000000, 4000000",
         ),
         (
+            "[suspend]\nsupply_v = \"battery\"",
+            "bench.toml, line 2: suspend.supply_v is \"battery\", allowed: \"model\", or [hold, release] in V for both servos",
+        ),
+        (
             "[bus]\nlatency_ms = -1",
             "bench.toml, line 2: bus.latency_ms is -1, allowed: 0 … 100",
         ),
@@ -77,10 +82,6 @@ fn errors_say_where_and_what_is_allowed() {
         (
             "[photometer]\nid = 1",
             "bench.toml, line 2: photometer.id is 1, allowed: an id that no other device of the rig has",
-        ),
-        (
-            "[light]\nmodel = \"AX-12\"",
-            "bench.toml, line 2: light.model is \"AX-12\", allowed: \"XM430-W350\", \"XM430-W210\", \"XM540-W270\", \"XM540-W150\", \"XH540-W270\", \"XH540-W150\"",
         ),
         (
             "[sensor]\nsign = 0",
@@ -146,6 +147,40 @@ fn errors_say_where_and_what_is_allowed() {
     for (text, expected) in table {
         assert_eq!(message(text), expected);
     }
+}
+
+#[test]
+fn a_model_that_is_not_known_is_answered_with_all_that_are() {
+    let message = message("[light]\nmodel = \"AX-12\"");
+    assert!(
+        message.starts_with("bench.toml, line 2: light.model is \"AX-12\", allowed: \"XM430-W350\", "),
+        "{message}"
+    );
+    for model in MODELS {
+        assert!(message.contains(&format!("\"{}\"", model.name)), "{message}");
+    }
+}
+
+#[test]
+fn the_supply_that_is_watched_follows_each_model() {
+    let bounds = |text: &str| {
+        let suspend = parse(text).unwrap().suspend;
+        suspend
+            .supply_v
+            .map(|band| band.map(|band| [band.hold, band.release]))
+    };
+    assert_eq!(bounds(""), [Some([10.5, 11.0]); 2]);
+    assert_eq!(bounds("[suspend]\nsupply_v = [9, 9.5]\n"), [Some([9.0, 9.5]); 2]);
+    assert_eq!(bounds("[suspend]\nsupply_v = [0, 0]\n"), [None; 2]);
+}
+
+/// What was stored before an axis had units of its own is of the X series, and what is stored of the X series has none.
+#[test]
+fn a_stored_axis_without_units_is_of_the_x_series() {
+    let axis = RigFile::default().arms[0].axis;
+    let text = toml::to_string(&axis).unwrap();
+    assert_eq!(text, "sign = 1.0\nzero_count = 2048.0\ngear = 1.0\n");
+    assert_eq!(toml::from_str::<Axis>(&text).unwrap(), axis);
 }
 
 #[test]
@@ -224,7 +259,7 @@ fn bounds_of_suspension_need_room_between_them() {
     // Too high holds above the first and goes on at the second, too low likewise below.
     assert!(lamp.holds(0.11, false) && !lamp.holds(0.07, false) && lamp.holds(0.07, true));
     assert!(!lamp.holds(0.05, true) && !lamp.holds(f64::NAN, true));
-    let supply = suspend.supply_v.unwrap();
+    let supply = suspend.supply_v[1].unwrap();
     assert!(supply.holds(9.7, false) && !supply.holds(11.0, false) && supply.holds(11.0, true));
     for bad in [
         "lamp_percent = [5, 10]",

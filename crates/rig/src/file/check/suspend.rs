@@ -2,23 +2,57 @@ use std::time::Duration;
 
 use toml::Spanned;
 
+use crate::dynamixel::Model;
 use crate::file::raw::RawSuspend;
 use crate::file::source::Source;
 use crate::{Band, RigError, Suspend};
 
 /// `[suspend]`
-pub(super) fn suspend(source: &Source<'_>, raw: &RawSuspend) -> Result<Suspend, RigError> {
+pub(super) fn suspend(
+    source: &Source<'_>,
+    raw: &RawSuspend,
+    models: [&Model; 2],
+) -> Result<Suspend, RigError> {
     let every_s = source.within("suspend.every_s", &raw.every_s, 0.2..=60.0)?;
     let high = |key, value, unit| band(source, key, value, true, unit);
     let low = |key, value, unit| band(source, key, value, false, unit);
     Ok(Suspend {
         every: Duration::from_secs_f64(every_s),
         temperature_c: high("suspend.temperature_c", &raw.temperature_c, 1.0)?,
-        supply_v: low("suspend.supply_v", &raw.supply_v, 1.0)?,
+        supply_v: supply(source, &raw.supply_v, models)?,
         lamp_rel: high("suspend.lamp_percent", &raw.lamp_percent, 0.01)?,
         disk_bytes: low("suspend.disk_mb", &raw.disk_mb, 1e6)?,
         door: raw.door,
     })
+}
+
+/// Bounds of both servos' supply: those of their models, or the same for both.
+fn supply(
+    source: &Source<'_>,
+    value: &Spanned<toml::Value>,
+    models: [&Model; 2],
+) -> Result<[Option<Band>; 2], RigError> {
+    const KEY: &str = "suspend.supply_v";
+    let number = |value: &toml::Value| value.as_float().or(value.as_integer().map(|whole| whole as f64));
+    match value.get_ref() {
+        toml::Value::String(word) if word == "model" => Ok(models.map(|model| {
+            let [hold, release] = model.supply_bounds_v();
+            Some(Band { hold, release })
+        })),
+        toml::Value::Array(bounds)
+            if bounds.len() == 2 && bounds.iter().all(|bound| number(bound).is_some()) =>
+        {
+            let bounds = [0, 1].map(|i| number(&bounds[i]).unwrap_or(f64::NAN));
+            let bounds = Spanned::new(value.span(), bounds);
+            Ok([band(source, KEY, &bounds, false, 1.0)?; 2])
+        }
+        other => Err(source.refuse(
+            KEY,
+            value,
+            other,
+            "\"model\", or [hold, release] in V for both servos",
+        )),
+    }
 }
 
 /// Bounds in a unit; a first one of 0 is none at all.

@@ -1,0 +1,111 @@
+use super::*;
+use crate::dynamixel::register::{common, servo};
+
+#[test]
+fn every_model_has_a_name_and_a_number_of_its_own() {
+    for (i, model) in MODELS.iter().enumerate() {
+        assert_eq!(Model::named(model.name), Some(model));
+        assert_eq!(Model::numbered(model.number), Some(model), "{}", model.name);
+        assert!(
+            MODELS[..i].iter().all(|other| other.name != model.name),
+            "{} is there twice",
+            model.name
+        );
+    }
+}
+
+#[test]
+fn the_bus_is_no_part_of_a_model() {
+    for model in MODELS {
+        for bus in model.series.buses {
+            assert_eq!(Model::named(&format!("{}{bus}", model.name)), Some(model));
+        }
+        assert_eq!(Model::named(&format!("{}-X", model.name)), None);
+    }
+    assert_eq!(Model::named("XM430"), None);
+    assert_eq!(Model::named(""), None);
+}
+
+/// A row that was typed wrongly would be caught here: what the manual says of every servo.
+#[test]
+fn the_figures_of_every_model_agree_with_each_other() {
+    for model in MODELS {
+        let name = model.name;
+        let series = model.series;
+        let [low, high] = model.position_limits;
+        assert!(
+            model.positions().contains(&low) && model.positions().contains(&high),
+            "{name}"
+        );
+        assert!(
+            model.velocity_limit > 0 && model.velocity_limit <= model.velocity_max,
+            "{name}"
+        );
+        assert!(
+            model
+                .acceleration_limit
+                .is_none_or(|limit| limit <= model.acceleration_max),
+            "{name}"
+        );
+        assert!(model.voltage_v().contains(&model.supply_v), "{name}");
+        assert!(model.voltage_least <= model.voltage_limits[0], "{name}");
+        assert!(model.modes.contains(&3), "{name} has position mode");
+        assert_eq!(
+            model.modes.contains(&5),
+            model.current_limit.is_some() && !series.centred,
+            "{name}"
+        );
+        assert!(model.gains.iter().all(|&gain| gain <= series.gain_max), "{name}");
+        assert!(series.firmware >= series.firmware_min, "{name}");
+        for area in series.indirect {
+            let [first, last] = series.indirect_targets;
+            assert!(
+                (first..=last).contains(&area.data),
+                "{name}: an unmapped cell shows itself"
+            );
+            assert!((first..=last).contains(&(area.data + area.cells - 1)), "{name}");
+        }
+    }
+}
+
+#[test]
+fn a_place_leads_back_to_the_register_that_it_is_of() {
+    for model in MODELS {
+        for address in 0..168 {
+            assert_eq!(
+                model.series.named_by(model.series.place(address)),
+                address,
+                "{}",
+                model.name
+            );
+        }
+    }
+    assert_eq!(
+        Model::named("XM430-W350")
+            .unwrap()
+            .at(servo::GOAL_POSITION)
+            .address,
+        116
+    );
+    assert_eq!(Model::named("XM430-W350").unwrap().at(common::ID), common::ID);
+}
+
+/// Model numbers of ROBOTIS' `dynamixel.model`, typed from there.
+#[test]
+fn numbers_are_those_of_robotis() {
+    let numbers = [
+        (1020, "XM430-W350"),
+        (1030, "XM430-W210"),
+        (1100, "XH540-W270"),
+        (1110, "XH540-W150"),
+        (1120, "XM540-W270"),
+        (1130, "XM540-W150"),
+    ];
+    for (number, name) in numbers {
+        assert_eq!(
+            Model::numbered(number).map(|model| model.name),
+            Some(name),
+            "{number}"
+        );
+    }
+}
