@@ -24,13 +24,15 @@ pub const PHOTOMETER_MODEL: u16 = 0x4750;
 
 /// Values of the Baud Rate register and what they mean, bits per second, as far as a rig may use them (e-manual,
 /// "Baud Rate(8)"; docs/photometer.md has the same).
-pub const BAUD_RATES: [(u8, u32); 6] = [
+pub const BAUD_RATES: [(u8, u32); 8] = [
+    (0, 9_600),
     (1, 57_600),
     (2, 115_200),
     (3, 1_000_000),
     (4, 2_000_000),
     (5, 3_000_000),
     (6, 4_000_000),
+    (7, 4_500_000),
 ];
 
 /// Registers that servos and photometer have in common.
