@@ -151,6 +151,89 @@ fn initial_values_are_the_manuals() {
     );
 }
 
+/// The default rig with a light servo of another model, at −45°.
+fn bench_of(model: &str, zero_deg: f64) -> Bench {
+    let text =
+        format!("[light]\nmodel = \"{model}\"\nzero_deg = {zero_deg}\n[sim]\nimperfections = \"none\"\n");
+    Bench::new(&rig::RigFile::parse(&text, "test.toml".as_ref()).unwrap()).unwrap()
+}
+
+/// Address, size and initial value of what differs from the XM430, from the e-manual page of each model.
+#[test]
+fn initial_values_of_other_models_are_those_of_their_pages() {
+    type Values = &'static [(u16, u16, i64)];
+    let models: [(&str, f64, Values); 4] = [
+        (
+            "XH430-V350-R",
+            180.0,
+            &[
+                (0, 2, 1040),
+                (32, 2, 300),
+                (34, 2, 110),
+                (38, 2, 689),
+                (44, 4, 135),
+                (144, 2, 240),
+            ],
+        ),
+        (
+            "XW540-T140",
+            180.0,
+            &[(0, 2, 1180), (44, 4, 304), (84, 2, 800), (65, 1, 0)],
+        ),
+        (
+            "XL430-W250",
+            180.0,
+            &[
+                (0, 2, 1060),
+                (31, 1, 72),
+                (32, 2, 140),
+                (34, 2, 60),
+                (44, 4, 415),
+                (80, 2, 4000),
+                (84, 2, 640),
+                (144, 2, 111),
+            ],
+        ),
+        (
+            "XC430-W240-T",
+            180.0,
+            &[(0, 2, 1080), (32, 2, 160), (44, 4, 306), (84, 2, 700)],
+        ),
+    ];
+    for (model, zero_deg, values) in models {
+        let mut bench = bench_of(model, zero_deg);
+        for &(address, size, value) in values {
+            assert_eq!(
+                read(&mut bench, address, size),
+                value,
+                "address {address} of an {model}"
+            );
+        }
+    }
+}
+
+#[test]
+fn what_a_model_lacks_cannot_be_written() {
+    let mut xl430 = bench_of("XL430-W250", 180.0);
+    assert_eq!(
+        write(&mut xl430, 38, 2, 100),
+        Err(Refusal::Access),
+        "Current Limit"
+    );
+    assert_eq!(
+        write(&mut xl430, 102, 2, 100),
+        Err(Refusal::Access),
+        "Goal Current"
+    );
+    assert_eq!(
+        write(&mut xl430, 11, 1, 5),
+        Err(Refusal::DataRange),
+        "current-based position"
+    );
+    let mut xw430 = bench_of("XW430-T200-R", 180.0);
+    assert_eq!(write(&mut xw430, 65, 1, 1), Err(Refusal::Access), "LED");
+}
+
 #[test]
 fn the_workshop_has_set_what_the_rig_file_says() {
     let mut bench = bench("");

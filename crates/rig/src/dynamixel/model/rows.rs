@@ -4,6 +4,9 @@ use super::series::X;
 /// Modes of a servo with current registers: current, velocity, position, extended position, current-based position, PWM.
 const ALL_MODES: &[u8] = &[0, 1, 3, 4, 5, 16];
 
+/// Modes of a servo without: velocity, position, extended position, PWM.
+const WITHOUT_CURRENT: &[u8] = &[1, 3, 4, 16];
+
 /// What the 12 V models of the X series have in common.
 const X_12V: Model = Model {
     name: "",
@@ -33,6 +36,46 @@ const X540_12V: Model = Model {
     ..X_12V
 };
 
+/// XH430 for 12 V, and XD430, whose table is the same.
+const XH430_W: Model = Model {
+    current_limit: Some(648),
+    gains: [1920, 100, 0, 0, 900],
+    ..X_12V
+};
+
+/// What the 24 V models of the X series have in common; currents of the XH430-V in 1.34 mA.
+const X_24V: Model = Model {
+    supply_v: 24.0,
+    voltage_limits: [110, 300],
+    voltage_least: 110,
+    ..X_12V
+};
+
+/// XW: watertight, without an LED.
+const XW430: Model = Model {
+    gains: [1920, 100, 0, 0, 900],
+    ..XW540
+};
+
+const XW540: Model = Model { leds: 0, ..X_12V };
+
+/// XL430, XC430 and the two-axis modules, of which each axis is a servo with an id of its own: no current registers.
+const X430_LOAD: Model = Model {
+    current_limit: None,
+    modes: WITHOUT_CURRENT,
+    voltage_limits: [60, 160],
+    voltage_least: 60,
+    ..X_12V
+};
+
+/// XL430 and 2XL430, for three cells.
+const XL430: Model = Model {
+    supply_v: 11.1,
+    voltage_limits: [60, 140],
+    temperature_limit_c: 72,
+    ..X430_LOAD
+};
+
 /// Every model that a rig may have.
 #[rustfmt::skip]
 pub static MODELS: &[Model] = &[
@@ -42,4 +85,24 @@ pub static MODELS: &[Model] = &[
     Model { name: "XM540-W150", number: 1130, velocity_limit: 230, ..X540_12V },
     Model { name: "XH540-W270", number: 1100, velocity_limit: 167, ..X540_12V },
     Model { name: "XH540-W150", number: 1110, velocity_limit: 300, ..X540_12V },
+    Model { name: "XH430-W350", number: 1000, velocity_limit: 130, ..XH430_W },
+    Model { name: "XH430-W210", number: 1010, velocity_limit: 210, ..XH430_W },
+    Model { name: "XH430-V350", number: 1040, current_limit: Some(689), velocity_limit: 135, ..X_24V },
+    Model { name: "XH430-V210", number: 1050, current_limit: Some(689), velocity_limit: 380, ..X_24V },
+    Model { name: "XH540-V270", number: 1140, velocity_limit: 128, external_ports: 3, ..X_24V },
+    Model { name: "XH540-V150", number: 1150, velocity_limit: 230, external_ports: 3, ..X_24V },
+    Model { name: "XD430-T350", number: 1001, velocity_limit: 130, ..XH430_W },
+    Model { name: "XD430-T210", number: 1011, velocity_limit: 210, ..XH430_W },
+    Model { name: "XD540-T270", number: 1101, velocity_limit: 167, ..X540_12V },
+    Model { name: "XD540-T150", number: 1111, velocity_limit: 300, ..X540_12V },
+    Model { name: "XW430-T333", number: 1270, velocity_limit: 139, ..XW430 },
+    Model { name: "XW430-T200", number: 1280, velocity_limit: 235, ..XW430 },
+    Model { name: "XW540-T260", number: 1170, velocity_limit: 167, ..XW540 },
+    Model { name: "XW540-T140", number: 1180, velocity_limit: 304, ..XW540 },
+    Model { name: "XW540-H260", number: 1310, current_limit: Some(1188), velocity_limit: 145, leds: 0, ..X_24V },
+    Model { name: "XL430-W250", number: 1060, velocity_limit: 415, gains: [1000, 100, 4000, 0, 640], ..XL430 },
+    Model { name: "2XL430-W250", number: 1090, velocity_limit: 250, gains: [1800, 100, 2000, 0, 640], ..XL430 },
+    Model { name: "XC430-W150", number: 1070, velocity_limit: 460, gains: [1920, 100, 0, 0, 460], ..X430_LOAD },
+    Model { name: "XC430-W240", number: 1080, velocity_limit: 306, gains: [1920, 100, 0, 0, 700], ..X430_LOAD },
+    Model { name: "2XC430-W250", number: 1160, velocity_limit: 275, gains: [1920, 100, 0, 0, 700], ..X430_LOAD },
 ];
