@@ -162,7 +162,7 @@ fn bench_of(model: &str, zero_deg: f64) -> Bench {
 #[test]
 fn initial_values_of_other_models_are_those_of_their_pages() {
     type Values = &'static [(u16, u16, i64)];
-    let models: [(&str, f64, Values); 4] = [
+    let models: [(&str, f64, Values); 6] = [
         (
             "XH430-V350-R",
             180.0,
@@ -198,6 +198,35 @@ fn initial_values_of_other_models_are_those_of_their_pages() {
             "XC430-W240-T",
             180.0,
             &[(0, 2, 1080), (32, 2, 160), (44, 4, 306), (84, 2, 700)],
+        ),
+        (
+            "XL330-M288-T",
+            180.0,
+            &[
+                (0, 2, 1200),
+                (31, 1, 70),
+                (32, 2, 70),
+                (34, 2, 35),
+                (38, 2, 1750),
+                (44, 4, 445),
+                (63, 1, 53),
+                (84, 2, 400),
+                (144, 2, 50),
+                (168, 2, 208),
+                (206, 2, 227),
+            ],
+        ),
+        (
+            "XC330-T181-T",
+            180.0,
+            &[
+                (0, 2, 1210),
+                (32, 2, 140),
+                (34, 2, 55),
+                (38, 2, 910),
+                (44, 4, 510),
+                (63, 1, 52),
+            ],
         ),
     ];
     for (model, zero_deg, values) in models {

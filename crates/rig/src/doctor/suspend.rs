@@ -129,7 +129,14 @@ mod tests {
             told.contains("24.0 V, and the XM430-W350 takes 9.5 … 16 V"),
             "{told}"
         );
-        assert_eq!(text("XH540-W270", 12.0), None);
+        assert_eq!(text("XH430-V350", 24.0), None);
+        let told = text("XH430-V350", 12.0).unwrap();
+        assert!(
+            told.contains("12.0 V: [suspend] holds every run there, from 21 on until 22"),
+            "{told}"
+        );
+        assert_eq!(text("XL330-M288", 5.0), None);
+        assert!(text("XL330-M288", 12.0).is_some());
     }
 
     proptest! {

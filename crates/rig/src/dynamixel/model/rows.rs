@@ -1,5 +1,5 @@
 use super::Model;
-use super::series::X;
+use super::series::{X, X330};
 
 /// Modes of a servo with current registers: current, velocity, position, extended position, current-based position, PWM.
 const ALL_MODES: &[u8] = &[0, 1, 3, 4, 5, 16];
@@ -76,6 +76,34 @@ const XL430: Model = Model {
     ..X430_LOAD
 };
 
+/// XL330 and XC330-M, for 5 V; currents in mA.
+const X330_5V: Model = Model {
+    series: &X330,
+    supply_v: 5.0,
+    voltage_limits: [35, 70],
+    voltage_least: 31,
+    temperature_limit_c: 70,
+    velocity_max: 2047,
+    ..X_12V
+};
+
+/// XL330.
+const XL330: Model = Model {
+    current_limit: Some(1750),
+    shutdown: 53,
+    ..X330_5V
+};
+
+/// XC330-T, for three cells.
+const XC330_T: Model = Model {
+    supply_v: 11.1,
+    voltage_limits: [55, 140],
+    voltage_least: 55,
+    current_limit: Some(910),
+    gains: [1200, 40, 0, 0, 900],
+    ..X330_5V
+};
+
 /// Every model that a rig may have.
 #[rustfmt::skip]
 pub static MODELS: &[Model] = &[
@@ -105,4 +133,10 @@ pub static MODELS: &[Model] = &[
     Model { name: "XC430-W150", number: 1070, velocity_limit: 460, gains: [1920, 100, 0, 0, 460], ..X430_LOAD },
     Model { name: "XC430-W240", number: 1080, velocity_limit: 306, gains: [1920, 100, 0, 0, 700], ..X430_LOAD },
     Model { name: "2XC430-W250", number: 1160, velocity_limit: 275, gains: [1920, 100, 0, 0, 700], ..X430_LOAD },
+    Model { name: "XL330-M077", number: 1190, velocity_limit: 1620, gains: [400, 40, 0, 400, 400], ..XL330 },
+    Model { name: "XL330-M288", number: 1200, velocity_limit: 445, gains: [1600, 180, 0, 0, 400], ..XL330 },
+    Model { name: "XC330-M181", number: 1230, velocity_limit: 545, current_limit: Some(2352), gains: [1400, 100, 500, 0, 1200], ..X330_5V },
+    Model { name: "XC330-M288", number: 1240, velocity_limit: 350, current_limit: Some(2352), gains: [1600, 50, 500, 0, 1100], ..X330_5V },
+    Model { name: "XC330-T181", number: 1210, velocity_limit: 510, ..XC330_T },
+    Model { name: "XC330-T288", number: 1220, velocity_limit: 320, ..XC330_T },
 ];

@@ -99,7 +99,7 @@ impl Series {
 
 /// XM, XH, XD, XW and the 430s without current registers (e-manual, XM430-W350). Bus Watchdog and Drive Mode came with
 /// firmware 38, Startup Configuration and the backup with firmware 45.
-pub(super) static X: Series = Series {
+const X_TABLE: Series = Series {
     name: "X",
     buses: &["-T", "-R"],
     ram: RAM,
@@ -132,4 +132,24 @@ pub(super) static X: Series = Series {
     baud_code_max: 7,
     firmware_min: 38,
     firmware: 46,
+};
+
+/// As it is.
+pub(super) static X: Series = X_TABLE;
+
+/// XL330 and XC330: 20 indirect cells, whose data are at 208 from firmware 52 on and elsewhere before (`xl330_m288.model`,
+/// `xl330_m288_fw52.model`); no baud rate beyond 4 M.
+pub(super) static X330: Series = Series {
+    name: "X330",
+    buses: &["-T"],
+    indirect: &[Indirect {
+        addresses: 168,
+        data: 208,
+        cells: 20,
+    }],
+    indirect_from_firmware: 52,
+    indirect_targets: [64, 227],
+    baud_code_max: 6,
+    firmware: 52,
+    ..X_TABLE
 };

@@ -117,6 +117,12 @@ fn numbers_are_those_of_robotis() {
         (1160, "2XC430-W250"),
         (1170, "XW540-T260"),
         (1180, "XW540-T140"),
+        (1190, "XL330-M077"),
+        (1200, "XL330-M288"),
+        (1210, "XC330-T181"),
+        (1220, "XC330-T288"),
+        (1230, "XC330-M181"),
+        (1240, "XC330-M288"),
         (1270, "XW430-T333"),
         (1310, "XW540-H260"),
     ];
@@ -127,4 +133,14 @@ fn numbers_are_those_of_robotis() {
             "{number}"
         );
     }
+}
+
+/// The indirect data of an XL330 moved with firmware 52 (`xl330_m288.model`, `xl330_m288_fw52.model`).
+#[test]
+fn old_firmware_has_no_indirect_data_at_a_known_place() {
+    let xl330 = Model::named("XL330-M288-T").unwrap().series;
+    assert_eq!(xl330.indirect(51), None);
+    assert_eq!(xl330.indirect(52).map(|area| area.data), Some(208));
+    let xm430 = Model::named("XM430-W350").unwrap().series;
+    assert_eq!(xm430.indirect(38).map(|area| area.data), Some(224));
 }
