@@ -162,7 +162,7 @@ fn bench_of(model: &str, zero_deg: f64) -> Bench {
 #[test]
 fn initial_values_of_other_models_are_those_of_their_pages() {
     type Values = &'static [(u16, u16, i64)];
-    let models: [(&str, f64, Values); 6] = [
+    let models: [(&str, f64, Values); 7] = [
         (
             "XH430-V350-R",
             180.0,
@@ -226,6 +226,17 @@ fn initial_values_of_other_models_are_those_of_their_pages() {
                 (38, 2, 910),
                 (44, 4, 510),
                 (63, 1, 52),
+            ],
+        ),
+        (
+            "MX-28AR",
+            180.0,
+            &[
+                (0, 2, 30),
+                (40, 4, 32_767),
+                (44, 4, 230),
+                (84, 2, 850),
+                (632, 2, 661),
             ],
         ),
     ];

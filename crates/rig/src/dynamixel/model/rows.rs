@@ -1,5 +1,5 @@
 use super::Model;
-use super::series::{X, X330};
+use super::series::{MX, X, X330};
 
 /// Modes of a servo with current registers: current, velocity, position, extended position, current-based position, PWM.
 const ALL_MODES: &[u8] = &[0, 1, 3, 4, 5, 16];
@@ -104,6 +104,14 @@ const XC330_T: Model = Model {
     ..X330_5V
 };
 
+/// MX with Protocol 2.0; currents in 3.36 mA.
+const MX_12V: Model = Model {
+    series: &MX,
+    acceleration_limit: Some(32_767),
+    gains: [1920, 100, 0, 0, 850],
+    ..X_12V
+};
+
 /// Every model that a rig may have.
 #[rustfmt::skip]
 pub static MODELS: &[Model] = &[
@@ -139,4 +147,7 @@ pub static MODELS: &[Model] = &[
     Model { name: "XC330-M288", number: 1240, velocity_limit: 350, current_limit: Some(2352), gains: [1600, 50, 500, 0, 1100], ..X330_5V },
     Model { name: "XC330-T181", number: 1210, velocity_limit: 510, ..XC330_T },
     Model { name: "XC330-T288", number: 1220, velocity_limit: 320, ..XC330_T },
+    Model { name: "MX-28", number: 30, velocity_limit: 230, current_limit: None, modes: WITHOUT_CURRENT, ..MX_12V },
+    Model { name: "MX-64", number: 311, velocity_limit: 435, current_limit: Some(1941), ..MX_12V },
+    Model { name: "MX-106", number: 321, velocity_limit: 360, ..MX_12V },
 ];

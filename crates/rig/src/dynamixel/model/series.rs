@@ -137,6 +137,17 @@ const X_TABLE: Series = Series {
 /// As it is.
 pub(super) static X: Series = X_TABLE;
 
+/// MX-28, MX-64 and MX-106 with Protocol 2.0: the table of the X
+/// series with Acceleration Limit, and without Startup Configuration and backup.
+pub(super) static MX: Series = Series {
+    name: "MX (2.0)",
+    buses: &["-T", "-R", "T", "R", "AT", "AR"],
+    startup: false,
+    backup_ready: None,
+    firmware: 43,
+    ..X_TABLE
+};
+
 /// XL330 and XC330: 20 indirect cells, whose data are at 208 from firmware 52 on and elsewhere before (`xl330_m288.model`,
 /// `xl330_m288_fw52.model`); no baud rate beyond 4 M.
 pub(super) static X330: Series = Series {

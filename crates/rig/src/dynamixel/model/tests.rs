@@ -94,6 +94,9 @@ fn a_place_leads_back_to_the_register_that_it_is_of() {
 #[test]
 fn numbers_are_those_of_robotis() {
     let numbers = [
+        (30, "MX-28"),
+        (311, "MX-64"),
+        (321, "MX-106"),
         (1000, "XH430-W350"),
         (1001, "XD430-T350"),
         (1010, "XH430-W210"),
