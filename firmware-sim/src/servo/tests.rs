@@ -162,7 +162,7 @@ fn bench_of(model: &str, zero_deg: f64) -> Bench {
 #[test]
 fn initial_values_of_other_models_are_those_of_their_pages() {
     type Values = &'static [(u16, u16, i64)];
-    let models: [(&str, f64, Values); 7] = [
+    let models: [(&str, f64, Values); 8] = [
         (
             "XH430-V350-R",
             180.0,
@@ -239,6 +239,30 @@ fn initial_values_of_other_models_are_those_of_their_pages() {
                 (632, 2, 661),
             ],
         ),
+        (
+            "PH54-200-S500-R",
+            0.0,
+            &[
+                (0, 2, 2020),
+                (24, 4, 20),
+                (32, 2, 350),
+                (34, 2, 150),
+                (36, 2, 2009),
+                (38, 2, 22_740),
+                (40, 4, 9982),
+                (44, 4, 2900),
+                (63, 1, 52),
+                (168, 2, 634),
+                (422, 2, 761),
+                (516, 1, 2),
+                (524, 2, 2209),
+                (526, 2, 6153),
+                (532, 2, 314),
+                (546, 1, 0),
+                (592, 2, 240),
+                (580, 4, -125_481),
+            ],
+        ),
     ];
     for (model, zero_deg, values) in models {
         let mut bench = bench_of(model, zero_deg);
@@ -272,6 +296,45 @@ fn what_a_model_lacks_cannot_be_written() {
     );
     let mut xw430 = bench_of("XW430-T200-R", 180.0);
     assert_eq!(write(&mut xw430, 65, 1, 1), Err(Refusal::Access), "LED");
+    let mut p = bench_of("PM54-040-S250-R", 0.0);
+    assert_eq!(
+        write(&mut p, 64, 1, 1),
+        Err(Refusal::Access),
+        "what the X series has there"
+    );
+    assert_eq!(
+        write(&mut p, 560, 4, 2841),
+        Err(Refusal::DataLimit),
+        "faster than the limit"
+    );
+    assert_eq!(write(&mut p, 556, 4, 11_038), Err(Refusal::DataLimit));
+    write(&mut p, 512, 1, 1).unwrap();
+    assert_eq!(
+        write(&mut p, 168, 2, 512),
+        Err(Refusal::Access),
+        "indirect addresses are EEPROM"
+    );
+}
+
+/// t₃ = t₁ + t₂ with t₁ = 600 · V / A ms (e-manual, PH54-200-S500-R, "Profile Velocity(560)"), t₂ = ΔP / v.
+#[test]
+fn a_p_series_moves_in_its_own_units() {
+    let mut bench = bench_of("PH54-200-S500-R", 0.0);
+    write(&mut bench, 560, 4, 1000).unwrap();
+    write(&mut bench, 556, 4, 2000).unwrap();
+    write(&mut bench, 512, 1, 1).unwrap();
+    // 36° on: a tenth of a turn at 10 rev/min.
+    write(&mut bench, 564, 4, -125_481 + 100_385).unwrap();
+    let start = bench.now();
+    while read(&mut bench, 570, 1) == 1 {
+        let next = bench.next_event().unwrap();
+        bench.advance_to(next);
+    }
+    let took_s = (bench.now() - start).as_secs_f64();
+    assert!((took_s - (0.3 + 0.6)).abs() < 1e-3, "{took_s} s");
+    assert_eq!(read(&mut bench, 580, 4), -25_096);
+    let light_deg = bench.pose().light.deg();
+    assert!((light_deg + 9.0).abs() < 1e-3, "{light_deg}");
 }
 
 #[test]

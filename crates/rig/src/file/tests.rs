@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use super::*;
+use crate::ServoUnits;
 use crate::dynamixel::MODELS;
 
 fn parse(text: &str) -> Result<RigFile, RigError> {
@@ -54,6 +55,18 @@ fn errors_say_where_and_what_is_allowed() {
         (
             "[bus]\nbaud = 19200",
             "bench.toml, line 2: bus.baud is 19200, allowed: 9600, 57600, 115200, 1000000, 2000000, 3000000, 4000000, 4500000",
+        ),
+        (
+            "[bus]\nbaud = 4500000\n[sensor]\nmodel = \"XC330-T288-T\"",
+            "bench.toml, line 2: bus.baud is 4500000, allowed: 9600, 57600, 115200, 1000000, 2000000, 3000000, 4000000 with an XC330-T288",
+        ),
+        (
+            "[sensor]\nmodel = \"PH54-200-S500-R\"",
+            "bench.toml: sensor.max_deg is 88, which is servo count 747308, allowed: servo counts -501923 … 501923 after zero_deg, sign and gear",
+        ),
+        (
+            "[sensor]\nmodel = \"PH42-020-S300\"\nzero_deg = 200",
+            "bench.toml, line 3: sensor.zero_deg is 200, allowed: -180 … 180",
         ),
         (
             "[suspend]\nsupply_v = \"battery\"",
@@ -161,6 +174,21 @@ fn a_model_that_is_not_known_is_answered_with_all_that_are() {
     }
 }
 
+/// What a P series counts, and in which units: 1,003,846 counts a turn, 0.01 rev/min, 1 rev/min².
+#[test]
+fn an_arm_has_the_units_of_its_servo() {
+    let rig = parse("[light]\nmodel = \"PH54-200-S500-R\"\nzero_deg = 10\n").unwrap();
+    let light = rig.arm(Arm::Light);
+    assert_eq!(light.model.number, 2020);
+    assert_eq!(light.axis.zero_count, 1_003_846.0 / 36.0);
+    // 60 °/s are 10 rev/min; 200 °/s² are 2000 rev/min².
+    assert_eq!(light.axis.profile_registers(light.profile), [1000, 2000]);
+    let quarter = light.axis.counts(ArmAngle::from_deg(90.0)) - light.axis.zero_count;
+    assert!((quarter - 250_961.5).abs() < 1e-6, "{quarter}");
+    let sensor = rig.arm(Arm::Sensor);
+    assert_eq!((sensor.model.number, sensor.axis.units), (1020, ServoUnits::X));
+}
+
 #[test]
 fn the_supply_that_is_watched_follows_each_model() {
     let bounds = |text: &str| {
@@ -170,6 +198,8 @@ fn the_supply_that_is_watched_follows_each_model() {
             .map(|band| band.map(|band| [band.hold, band.release]))
     };
     assert_eq!(bounds(""), [Some([10.5, 11.0]); 2]);
+    let mixed = "[light]\nmodel = \"XH430-V350\"\nvelocity_deg_s = 30\n[sensor]\nmodel = \"XL330-M288\"\n";
+    assert_eq!(bounds(mixed), [Some([21.0, 22.0]), Some([4.4, 4.6])]);
     assert_eq!(bounds("[suspend]\nsupply_v = [9, 9.5]\n"), [Some([9.0, 9.5]); 2]);
     assert_eq!(bounds("[suspend]\nsupply_v = [0, 0]\n"), [None; 2]);
 }
@@ -181,6 +211,12 @@ fn a_stored_axis_without_units_is_of_the_x_series() {
     let text = toml::to_string(&axis).unwrap();
     assert_eq!(text, "sign = 1.0\nzero_count = 2048.0\ngear = 1.0\n");
     assert_eq!(toml::from_str::<Axis>(&text).unwrap(), axis);
+    let other = parse("[light]\nmodel = \"PM42-010-S260\"\nzero_deg = 0\n")
+        .unwrap()
+        .arms[0]
+        .axis;
+    let text = toml::to_string(&other).unwrap();
+    assert_eq!(toml::from_str::<Axis>(&text).unwrap(), other);
 }
 
 #[test]

@@ -1,5 +1,5 @@
 use super::Model;
-use super::series::{MX, X, X330};
+use super::series::{MX, P, X, X330};
 
 /// Modes of a servo with current registers: current, velocity, position, extended position, current-based position, PWM.
 const ALL_MODES: &[u8] = &[0, 1, 3, 4, 5, 16];
@@ -112,6 +112,19 @@ const MX_12V: Model = Model {
     ..X_12V
 };
 
+/// What the P series has in common; currents in mA.
+const P_24V: Model = Model {
+    series: &P,
+    supply_v: 24.0,
+    voltage_limits: [150, 350],
+    voltage_least: 150,
+    modes: &[0, 1, 3, 4, 16],
+    shutdown: 58,
+    leds: 3,
+    external_ports: 4,
+    ..X_12V
+};
+
 /// Every model that a rig may have.
 #[rustfmt::skip]
 pub static MODELS: &[Model] = &[
@@ -150,4 +163,10 @@ pub static MODELS: &[Model] = &[
     Model { name: "MX-28", number: 30, velocity_limit: 230, current_limit: None, modes: WITHOUT_CURRENT, ..MX_12V },
     Model { name: "MX-64", number: 311, velocity_limit: 435, current_limit: Some(1941), ..MX_12V },
     Model { name: "MX-106", number: 321, velocity_limit: 360, ..MX_12V },
+    Model { name: "PH54-200-S500", number: 2020, counts_per_turn: 1_003_846, position_limits: [-501_433, 501_433], current_limit: Some(22_740), acceleration_limit: Some(9982), acceleration_max: 3_992_644, velocity_limit: 2900, velocity_max: 2900, gains: [2209, 6153, 0, 0, 314], shutdown: 52, ..P_24V },
+    Model { name: "PH54-100-S500", number: 2010, counts_per_turn: 1_003_846, position_limits: [-501_433, 501_433], current_limit: Some(15_900), acceleration_limit: Some(4_255_632), acceleration_max: 4_255_632, velocity_limit: 2920, velocity_max: 2920, gains: [1290, 3593, 0, 0, 502], ..P_24V },
+    Model { name: "PH42-020-S300", number: 2000, counts_per_turn: 607_500, position_limits: [-303_454, 303_454], current_limit: Some(4500), acceleration_limit: Some(10_765), acceleration_max: 4_306_173, velocity_limit: 2920, velocity_max: 2920, gains: [502, 1332, 0, 0, 879], ..P_24V },
+    Model { name: "PM54-060-S250", number: 2120, counts_per_turn: 502_834, position_limits: [-251_173, 251_173], current_limit: Some(7980), acceleration_limit: Some(11_145), acceleration_max: 4_457_932, velocity_limit: 2830, velocity_max: 2830, gains: [813, 2265, 0, 0, 502], ..P_24V },
+    Model { name: "PM54-040-S250", number: 2110, counts_per_turn: 502_834, position_limits: [-251_173, 251_173], current_limit: Some(4470), acceleration_limit: Some(11_037), acceleration_max: 4_414_976, velocity_limit: 2840, velocity_max: 2840, gains: [408, 1137, 0, 0, 502], ..P_24V },
+    Model { name: "PM42-010-S260", number: 2100, counts_per_turn: 526_374, position_limits: [-262_931, 262_931], current_limit: Some(1461), acceleration_limit: Some(4_346_756), acceleration_max: 4_346_756, velocity_limit: 2600, velocity_max: 2600, gains: [6740, 2145, 0, 0, 1061], ..P_24V },
 ];

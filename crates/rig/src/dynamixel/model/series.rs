@@ -164,3 +164,31 @@ pub(super) static X330: Series = Series {
     firmware: 52,
     ..X_TABLE
 };
+
+/// PH and PM: the RAM area of the X series at 512, 128 indirect cells with their addresses in the EEPROM, positions from the
+/// middle of the turn, other units. Their firmwares are numbered anew, and all have watchdog and drive mode.
+pub(super) static P: Series = Series {
+    name: "P",
+    buses: &["-R"],
+    ram: 512,
+    velocity_unit_rpm: 0.01,
+    acceleration_unit_rpm2: 1.0,
+    centred: true,
+    multi_turn: i32::MAX,
+    profile_velocity_max: 2920,
+    profile_within_limit: true,
+    moving_threshold: 20,
+    pwm_limit: 2009,
+    gain_max: 32_767,
+    indirect: &[Indirect {
+        addresses: 168,
+        data: 634,
+        cells: 128,
+    }],
+    indirect_targets: [512, 1023],
+    indirect_in_eeprom: true,
+    backup_ready: Some(878),
+    firmware_min: 1,
+    firmware: 12,
+    ..X_TABLE
+};

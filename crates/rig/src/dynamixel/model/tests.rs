@@ -128,6 +128,12 @@ fn numbers_are_those_of_robotis() {
         (1240, "XC330-M288"),
         (1270, "XW430-T333"),
         (1310, "XW540-H260"),
+        (2000, "PH42-020-S300"),
+        (2010, "PH54-100-S500"),
+        (2020, "PH54-200-S500"),
+        (2100, "PM42-010-S260"),
+        (2110, "PM54-040-S250"),
+        (2120, "PM54-060-S250"),
     ];
     for (number, name) in numbers {
         assert_eq!(
@@ -136,6 +142,36 @@ fn numbers_are_those_of_robotis() {
             "{number}"
         );
     }
+}
+
+/// Addresses of ROBOTIS' `ph54_200_s500.model`, typed from there.
+#[test]
+fn the_p_series_has_its_registers_where_robotis_says() {
+    let p = Model::named("PH54-200-S500-R").unwrap();
+    let addresses = [
+        (common::STATUS_RETURN_LEVEL, 516),
+        (common::HARDWARE_ERROR_STATUS, 518),
+        (common::BUS_WATCHDOG, 546),
+        (common::RETURN_DELAY_TIME, 9),
+        (servo::ACCELERATION_LIMIT, 40),
+        (servo::VELOCITY_LIMIT, 44),
+        (servo::SHUTDOWN, 63),
+        (servo::TORQUE_ENABLE, 512),
+        (servo::PROFILE_ACCELERATION, 556),
+        (servo::PROFILE_VELOCITY, 560),
+        (servo::GOAL_POSITION, 564),
+        (servo::MOVING, 570),
+        (servo::MOVING_STATUS, 571),
+        (servo::PRESENT_VELOCITY, 576),
+        (servo::PRESENT_POSITION, 580),
+        (servo::PRESENT_INPUT_VOLTAGE, 592),
+        (servo::PRESENT_TEMPERATURE, 594),
+    ];
+    for (register, address) in addresses {
+        assert_eq!(p.at(register).address, address, "{}", register.name);
+    }
+    assert_eq!(p.positions(), -501_923..=501_923);
+    assert_eq!(p.homing_offset_max(), 250_961, "90°");
 }
 
 /// The indirect data of an XL330 moved with firmware 52 (`xl330_m288.model`, `xl330_m288_fw52.model`).
