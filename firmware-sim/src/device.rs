@@ -45,8 +45,13 @@ pub trait Device {
     /// Whether it hears anything at all (not while it boots, not when a fault silences it).
     fn listens(&self) -> bool;
 
-    /// Takes note that a good packet for this device arrived: feeds the bus watchdog.
+    /// Takes note that a good instruction packet arrived, for whatever device: feeds the bus watchdog.
     fn heard(&mut self);
+
+    /// The id of the group that it belongs to: it also takes writes to that, and does not answer them.
+    fn secondary_id(&self) -> Option<u8> {
+        None
+    }
 
     /// Bytes of the control table.
     ///
@@ -59,6 +64,23 @@ pub trait Device {
     /// # Errors
     /// Addresses that do not exist or may not be written, values out of range, locked EEPROM, tripped watchdog.
     fn write(&mut self, address: u16, bytes: &[u8]) -> Result<(), Refusal>;
+
+    /// Writes to the control table, asked for under the id of the group: only to what is not in the EEPROM.
+    ///
+    /// # Errors
+    /// As [`Device::write`].
+    fn write_to_group(&mut self, address: u16, bytes: &[u8]) -> Result<(), Refusal> {
+        self.write(address, bytes)
+    }
+
+    /// Control Table Backup (0x20) with its parameters.
+    ///
+    /// # Errors
+    /// Parameters that are not the documented ones, a device without backup, a restore while the EEPROM is locked or with
+    /// nothing to restore.
+    fn back_up(&mut self, _parameters: &[u8]) -> Result<(), Refusal> {
+        Err(Refusal::Instruction)
+    }
 
     /// Takes note whether a Reg Write waits for Action (X-series register 69); devices without that register need not
     /// care.

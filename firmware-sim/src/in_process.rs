@@ -229,12 +229,12 @@ impl SharedBench {
 
     fn read(&self, device: Device, register: Register) -> Result<i64, InProcessError> {
         let mut bench = self.lock();
+        hear(&mut bench);
         let asked = bench.device(device);
         let what = register.name;
         if !asked.listens() {
             return Err(InProcessError::NoReply { device, what });
         }
-        asked.heard();
         match asked.read(asked.place(register.address), register.size) {
             Ok(bytes) => Ok(decode(&bytes)),
             Err(refusal) => Err(InProcessError::Refused {
@@ -254,12 +254,12 @@ impl SharedBench {
     fn write_bytes(&self, device: Device, first: Register, bytes: &[u8]) -> Result<(), InProcessError> {
         let mut bench = self.lock();
         let at = bench.now();
+        hear(&mut bench);
         let asked = bench.device(device);
         let what = first.name;
         if !asked.listens() {
             return Err(InProcessError::NoReply { device, what });
         }
-        asked.heard();
         if let Some(written) = self.log().as_mut() {
             written.push(Written::new(at, device, asked, first.address, bytes));
         }
@@ -273,6 +273,15 @@ impl SharedBench {
         match device == Device::Photometer && bench.take_lost_acknowledgement() {
             true => Err(InProcessError::NoReply { device, what }),
             false => Ok(()),
+        }
+    }
+}
+
+/// Every request is one that all devices hear, as on a bus.
+fn hear(bench: &mut Bench) {
+    for device in bench.devices() {
+        if device.listens() {
+            device.heard();
         }
     }
 }

@@ -44,7 +44,7 @@ pub(crate) struct Fitting {
 /// A servo: its control table and the motion behind it.
 ///
 /// It moves in the position modes (3, 4, 5). The modes for wheels and torque can be set, so that a host can be seen
-/// to refuse them, and hold the shaft still. Of the gains P and I have an effect; backup and restore do not exist.
+/// to refuse them, and hold the shaft still. Of the gains P and I have an effect.
 ///
 /// Motion happens in shaft counts: where the shaft is, on a line that goes on over many turns. Position registers
 /// show that line with direction, lost turns and homing offset.
@@ -64,6 +64,8 @@ pub(crate) struct Servo {
     /// Where in its tremble the shaft is at power-on, s.
     phase_s: f64,
     sags_until: Duration,
+    /// What Control Table Backup stored.
+    backup: Option<Table>,
     stalled_until: Option<Duration>,
 }
 
@@ -86,6 +88,7 @@ impl Servo {
             profile_type: 0,
             lost_turns: 0.0,
             sags_until: Duration::ZERO,
+            backup: None,
             stalled_until: None,
         };
         servo.start_up();

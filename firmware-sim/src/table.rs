@@ -145,6 +145,15 @@ impl Table {
         found.is_ok()
     }
 
+    /// Puts the EEPROM back to what it was in another copy of this table.
+    pub(crate) fn restore(&mut self, backup: &Self) {
+        for register in Arc::clone(&self.registers).iter() {
+            if register.access == Access::Eeprom {
+                self.set(*register, backup.get(*register));
+            }
+        }
+    }
+
     /// The byte at an address of the table.
     pub(crate) fn byte(&self, address: u16) -> u8 {
         self.bytes[usize::from(address)]

@@ -9,6 +9,11 @@ use crate::{Device, Refusal};
 /// Parameters of Clear that reset the turns of the present position.
 const CLEAR_TURNS: [u8; 5] = [0x01, 0x44, 0x58, 0x4C, 0x22];
 
+/// Parameters of Control Table Backup: what to do, and what keeps it from being done by mistake ("CTRL").
+const BACKUP_STORE: u8 = 1;
+const BACKUP_RESTORE: u8 = 2;
+const BACKUP_KEY: [u8; 4] = *b"CTRL";
+
 impl Device for Servo {
     fn id(&self) -> u8 {
         self.node.id()
@@ -42,9 +47,50 @@ impl Device for Servo {
         self.node.hear();
     }
 
+    fn secondary_id(&self) -> Option<u8> {
+        let id = self.node.table.get(reg::SECONDARY_ID) as u8;
+        (id <= reg::SECONDARY_ID_MAX).then_some(id)
+    }
+
+    fn write_to_group(&mut self, address: u16, bytes: &[u8]) -> Result<(), Refusal> {
+        let values = self.values(address, bytes)?;
+        if values
+            .iter()
+            .any(|(register, _)| register.access == Access::Eeprom)
+        {
+            return Err(Refusal::Access);
+        }
+        self.take(values)
+    }
+
+    fn back_up(&mut self, parameters: &[u8]) -> Result<(), Refusal> {
+        if self.fitting.model.series.backup_ready.is_none() {
+            return Err(Refusal::Instruction);
+        }
+        match parameters.split_first_chunk::<1>() {
+            Some(([BACKUP_STORE], key)) if key == BACKUP_KEY => {
+                self.backup = Some(self.node.table.clone());
+            }
+            Some(([BACKUP_RESTORE], key)) if key == BACKUP_KEY && self.torque() => {
+                return Err(Refusal::Access);
+            }
+            Some(([BACKUP_RESTORE], key)) if key == BACKUP_KEY => {
+                let backup = self.backup.take().ok_or(Refusal::Result)?;
+                self.node.table.restore(&backup);
+                self.backup = Some(backup);
+                self.remap();
+            }
+            _ => return Err(Refusal::DataRange),
+        }
+        Ok(())
+    }
+
     fn read(&self, address: u16, length: u16) -> Result<Vec<u8>, Refusal> {
         self.node.table.check_stretch(address, usize::from(length))?;
-        let live = self.live();
+        let mut live = self.live();
+        if let Some(ready) = self.fitting.model.series.backup_ready.map(reg::backup_ready) {
+            live.set(ready, i64::from(self.backup.is_some()));
+        }
         Ok((address..address + length)
             .map(|address| live.byte(self.target(address)))
             .collect())

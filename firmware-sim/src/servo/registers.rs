@@ -24,6 +24,8 @@ pub(super) const RETURN_DELAY: Register = Register::new(9, 1, Eeprom, 250, (0, 2
 pub(super) const DRIVE_MODE: Register = Register::new(10, 1, Eeprom, 0, (0, 15));
 pub(super) const OPERATING_MODE: Register = Register::new(11, 1, Eeprom, 3, (0, 16));
 pub(super) const SECONDARY_ID: Register = Register::new(12, 1, Eeprom, 255, (0, 255));
+/// Largest secondary id; beyond, the servo belongs to no group.
+pub(super) const SECONDARY_ID_MAX: u8 = 252;
 pub(super) const PROTOCOL: Register = Register::new(13, 1, Eeprom, 2, (2, 2));
 pub(super) const HOMING_OFFSET: Register = Register::new(20, 4, Eeprom, 0, SIGNED_32);
 pub(super) const MOVING_THRESHOLD: Register = Register::new(24, 4, Eeprom, 10, BY_MODEL);

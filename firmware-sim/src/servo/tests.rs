@@ -338,6 +338,43 @@ fn a_p_series_moves_in_its_own_units() {
 }
 
 #[test]
+fn a_backup_brings_the_eeprom_back_and_nothing_else() {
+    let mut bench = bench("");
+    let [store, restore] = [1, 2].map(|what| [what, b'C', b'T', b'R', b'L']);
+    assert_eq!(
+        light(&mut bench).back_up(&restore),
+        Err(Refusal::Result),
+        "there is none"
+    );
+    assert_eq!(read(&mut bench, 147, 1), 0);
+    light(&mut bench).back_up(&store).unwrap();
+    light(&mut bench).factory_reset(2).unwrap();
+    assert_eq!(read(&mut bench, 147, 1), 1, "it outlives a reset");
+    assert_eq!((read(&mut bench, 52, 4), read(&mut bench, 48, 4)), (0, 4095));
+    write(&mut bench, 84, 2, 640).unwrap();
+    write(&mut bench, 64, 1, 1).unwrap();
+    assert_eq!(
+        light(&mut bench).back_up(&restore),
+        Err(Refusal::Access),
+        "locked"
+    );
+    write(&mut bench, 64, 1, 0).unwrap();
+    light(&mut bench).back_up(&restore).unwrap();
+    assert_eq!((read(&mut bench, 52, 4), read(&mut bench, 48, 4)), (1046, 3050));
+    assert_eq!(read(&mut bench, 84, 2), 640, "gains are RAM");
+    assert_eq!(
+        light(&mut bench).back_up(&[1, b'C', b'T', b'R']),
+        Err(Refusal::DataRange)
+    );
+    assert_eq!(
+        light(&mut bench).back_up(&[3, b'C', b'T', b'R', b'L']),
+        Err(Refusal::DataRange)
+    );
+    let mut mx = bench_of("MX-64", 180.0);
+    assert_eq!(light(&mut mx).back_up(&store), Err(Refusal::Instruction));
+}
+
+#[test]
 fn the_workshop_has_set_what_the_rig_file_says() {
     let mut bench = bench("");
     assert_eq!(light(&mut bench).baud(), 1_000_000);

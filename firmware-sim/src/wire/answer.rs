@@ -46,7 +46,6 @@ pub(crate) fn ask(
     for device in devices.iter_mut().filter(|device| device.id() == id) {
         // As they were when the packet came: a new id, baud rate or level counts from the next packet on.
         let (delay, answers) = (device.return_delay(), device.status_return_level() >= level as u8);
-        device.heard();
         let result = act(&mut **device);
         if !answers {
             continue;

@@ -15,7 +15,16 @@ const FIRMWARE_VERSION: (u16, u16) = (6, 1);
 #[derive(Debug, Default)]
 pub(crate) struct Dispatcher {
     /// What Reg Write left for Action, by id.
-    registered: BTreeMap<u8, (u16, Vec<u8>)>,
+    registered: BTreeMap<u8, Registered>,
+}
+
+/// A write that waits.
+#[derive(Debug)]
+struct Registered {
+    address: u16,
+    bytes: Vec<u8>,
+    /// It was asked for under the id of the device's group.
+    of_group: bool,
 }
 
 impl Dispatcher {
@@ -24,11 +33,17 @@ impl Dispatcher {
     /// A device that the host waits for and that says nothing (unknown id, status return level) is
     /// [`Slot::Silence`]. Nobody answers what was sent to all, except a ping and reads that name their devices.
     pub(crate) fn dispatch(&mut self, packet: &Packet, devices: &mut [&mut dyn Device]) -> Vec<Slot> {
-        let instruction = match Instruction::decode(packet) {
-            None => return Vec::new(),
-            Some(Err(_)) if packet.id == BROADCAST => return Vec::new(),
-            Some(Err(refusal)) => return vec![ask(devices, packet.id, Level::All, 0, |_| Err(refusal))],
-            Some(Ok(instruction)) => instruction,
+        let Some(decoded) = Instruction::decode(packet) else {
+            return Vec::new();
+        };
+        // Whatever it asks for, and of whom: all that is communication to a bus watchdog (e-manual, "Bus Watchdog").
+        for device in devices.iter_mut() {
+            device.heard();
+        }
+        let instruction = match decoded {
+            Err(_) if packet.id == BROADCAST => return Vec::new(),
+            Err(refusal) => return vec![ask(devices, packet.id, Level::All, 0, |_| Err(refusal))],
+            Ok(instruction) => instruction,
         };
         match instruction {
             Instruction::Reads(reads) => reads.into_iter().map(|read| answer_read(devices, read)).collect(),
@@ -39,6 +54,9 @@ impl Dispatcher {
                     ask(devices, write.id, Level::All, 0, |device| {
                         device.write(write.address, write.bytes).map(|()| Vec::new())
                     });
+                    for device in group(devices, write.id) {
+                        let _ = device.write_to_group(write.address, write.bytes);
+                    }
                 }
                 Vec::new()
             }
@@ -48,15 +66,21 @@ impl Dispatcher {
             Instruction::Read(read) => vec![answer_read(devices, read)],
             other if packet.id == BROADCAST => {
                 for device in devices {
-                    device.heard();
                     // As above: a refusal of what was sent to all stays unsaid.
                     let _ = self.carry_out(&mut **device, &other);
                 }
                 Vec::new()
             }
-            other => vec![ask(devices, packet.id, Level::All, 0, |device| {
-                self.carry_out(device, &other).map(|()| Vec::new())
-            })],
+            other => {
+                let answer = ask(devices, packet.id, Level::All, 0, |device| {
+                    self.carry_out(device, &other).map(|()| Vec::new())
+                });
+                for device in group(devices, packet.id) {
+                    // Nobody answers under the id of a group.
+                    let _ = self.carry_out_in_group(device, &other);
+                }
+                vec![answer]
+            }
         }
     }
 
@@ -66,14 +90,16 @@ impl Dispatcher {
         match instruction {
             Instruction::Write(Write { address, bytes, .. }) => device.write(*address, bytes),
             Instruction::RegWrite(Write { address, bytes, .. }) => {
-                self.registered.insert(id, (*address, bytes.to_vec()));
-                device.registered(true);
+                self.register(device, *address, bytes, false);
                 Ok(())
             }
             Instruction::Action => {
-                let (address, bytes) = self.registered.remove(&id).ok_or(Refusal::Instruction)?;
+                let write = self.registered.remove(&id).ok_or(Refusal::Instruction)?;
                 device.registered(false);
-                device.write(address, &bytes)
+                match write.of_group {
+                    true => device.write_to_group(write.address, &write.bytes),
+                    false => device.write(write.address, &write.bytes),
+                }
             }
             Instruction::FactoryReset(option) => device.factory_reset(*option),
             Instruction::Reboot => {
@@ -83,6 +109,7 @@ impl Dispatcher {
                 Ok(())
             }
             Instruction::Clear(parameters) => device.clear(parameters),
+            Instruction::BackUp(parameters) => device.back_up(parameters),
             Instruction::Ping
             | Instruction::Read(_)
             | Instruction::Reads(_)
@@ -90,6 +117,41 @@ impl Dispatcher {
             | Instruction::Writes(_) => Err(Refusal::Instruction),
         }
     }
+
+    /// What a device does for the id of its group: writes, now or at Action. The manual names no other instruction.
+    fn carry_out_in_group(
+        &mut self,
+        device: &mut dyn Device,
+        instruction: &Instruction<'_>,
+    ) -> Result<(), Refusal> {
+        match instruction {
+            Instruction::Write(Write { address, bytes, .. }) => device.write_to_group(*address, bytes),
+            Instruction::RegWrite(Write { address, bytes, .. }) => {
+                self.register(device, *address, bytes, true);
+                Ok(())
+            }
+            Instruction::Action => self.carry_out(device, instruction),
+            _ => Ok(()),
+        }
+    }
+
+    fn register(&mut self, device: &mut dyn Device, address: u16, bytes: &[u8], of_group: bool) {
+        let write = Registered {
+            address,
+            bytes: bytes.to_vec(),
+            of_group,
+        };
+        self.registered.insert(device.id(), write);
+        device.registered(true);
+    }
+}
+
+/// The devices of a group; not one whose own id it is, which has the higher priority (e-manual, "Secondary ID(12)").
+fn group<'a>(devices: &'a mut [&mut dyn Device], id: u8) -> impl Iterator<Item = &'a mut (dyn Device + 'a)> {
+    devices
+        .iter_mut()
+        .filter(move |device| device.id() != id && device.secondary_id() == Some(id))
+        .map(|device| &mut **device as &mut (dyn Device + 'a))
 }
 
 fn answer_read(devices: &mut [&mut dyn Device], Read { id, address, length }: Read) -> Slot {

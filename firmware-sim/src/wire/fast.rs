@@ -49,7 +49,6 @@ pub(crate) fn answer(devices: &mut [&mut dyn Device], reads: &[Read]) -> Vec<Slo
 
 /// Adds one device's part. A refusal still fills its place, with zeros, since the host walks with a fixed stride.
 fn push_part(bytes: &mut Vec<u8>, device: &mut dyn Device, Read { id, address, length }: Read) {
-    device.heard();
     let (number, data) = match device.read(address, length) {
         Ok(data) => (0, data),
         Err(refusal) => (refusal as u8, vec![0; length.into()]),

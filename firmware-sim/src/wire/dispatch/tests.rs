@@ -67,7 +67,11 @@ fn read_and_write_reach_the_table() {
     );
     assert_eq!(devices[0].table[0x74..0x78], [1, 2, 3, 4]);
     assert_eq!(devices[1].table[0x74], 0x74, "id 3 was not meant");
-    assert_eq!([devices[0].heard, devices[1].heard], [2, 0]);
+    assert_eq!(
+        devices.each_ref().map(|device| device.heard),
+        [2; 3],
+        "whom a packet is for is nothing to a watchdog"
+    );
 }
 
 #[test]
@@ -194,6 +198,103 @@ fn a_registered_write_waits_for_action() {
         send(&mut devices, 1, 0x05, &[]),
         [status(1, 2, &[])],
         "a reboot forgets it"
+    );
+}
+
+/// The manual's example (e-manual, XM430-W350, "Secondary(Shadow) ID(12)") with two servos, ids 1 and 2.
+#[test]
+fn a_group_takes_writes_to_its_ram_and_does_not_answer() {
+    const SECONDARY_ID: u16 = 12;
+    const LED: u16 = 65;
+    let rig = rig::RigFile::parse("", "test.toml".as_ref()).unwrap();
+    let mut bench = crate::Bench::new(&rig).unwrap();
+    let mut dispatcher = Dispatcher::default();
+    let mut write = |bench: &mut crate::Bench, id: u8, instruction: u8, address: u16, value: u8| {
+        let [low, high] = address.to_le_bytes();
+        let params = match instruction {
+            0x05 => Vec::new(),
+            _ => vec![low, high, value],
+        };
+        let packet = Packet {
+            id,
+            instruction,
+            params,
+        };
+        dispatcher.dispatch(&packet, &mut bench.devices())
+    };
+    let leds = |bench: &mut crate::Bench| {
+        [rig::Device::Light, rig::Device::Sensor].map(|device| bench.device(device).read(LED, 1).unwrap()[0])
+    };
+    for id in [1, 2] {
+        assert_eq!(
+            write(&mut bench, id, 0x03, SECONDARY_ID, 2),
+            [status(id, 0, ACKNOWLEDGED)]
+        );
+    }
+    assert_eq!(write(&mut bench, 1, 0x03, LED, 1), [status(1, 0, ACKNOWLEDGED)]);
+    assert_eq!(leds(&mut bench), [1, 0], "its own id alone");
+    assert_eq!(write(&mut bench, 2, 0x03, LED, 1), [status(2, 0, ACKNOWLEDGED)]);
+    assert_eq!(leds(&mut bench), [1, 1], "one answers, both obey");
+
+    for id in [1, 2] {
+        assert_eq!(
+            write(&mut bench, id, 0x03, SECONDARY_ID, 100),
+            [status(id, 0, ACKNOWLEDGED)]
+        );
+    }
+    assert_eq!(write(&mut bench, 100, 0x03, LED, 0), [silence(11)]);
+    assert_eq!(leds(&mut bench), [0, 0]);
+    assert_eq!(write(&mut bench, 100, 0x04, LED, 1), [silence(11)], "registered");
+    assert_eq!(write(&mut bench, 100, 0x05, 0, 0), [silence(11)], "done");
+    assert_eq!(leds(&mut bench), [1, 1]);
+    assert_eq!(write(&mut bench, 100, 0x03, 9, 33), [silence(11)]);
+    let delay = bench.device(rig::Device::Light).read(9, 1).unwrap();
+    assert_eq!(delay, [0], "the EEPROM is not the group's");
+
+    for id in [1, 2] {
+        assert_eq!(
+            write(&mut bench, id, 0x03, SECONDARY_ID, 253),
+            [status(id, 0, ACKNOWLEDGED)]
+        );
+    }
+    assert_eq!(write(&mut bench, 253, 0x03, LED, 0), [silence(11)]);
+    assert_eq!(leds(&mut bench), [1, 1], "253 and beyond are no group");
+}
+
+/// All instruction packets are communication (e-manual, "Bus Watchdog(98)"), to whatever id they are.
+#[test]
+fn a_watchdog_is_fed_by_what_is_said_to_others() {
+    let rig = rig::RigFile::parse("", "test.toml".as_ref()).unwrap();
+    let mut bench = crate::Bench::new(&rig).unwrap();
+    let light = rig::Device::Light;
+    bench.device(light).write(64, &[1]).unwrap();
+    bench.device(light).write(98, &[10]).unwrap();
+    let mut dispatcher = Dispatcher::default();
+    let mut tell = |bench: &mut crate::Bench, ms: u64, id: u8, instruction: u8| {
+        bench.advance_to(Duration::from_millis(ms));
+        let packet = Packet {
+            id,
+            instruction,
+            params: Vec::new(),
+        };
+        dispatcher.dispatch(&packet, &mut bench.devices());
+        bench.device(light).read(98, 1).unwrap()[0]
+    };
+    assert_eq!(tell(&mut bench, 150, 2, 0x01), 10, "a ping of the other servo");
+    assert_eq!(
+        tell(&mut bench, 300, 77, 0x02),
+        10,
+        "a read of nobody, without parameters"
+    );
+    assert_eq!(
+        tell(&mut bench, 450, 1, STATUS),
+        10,
+        "a status packet is in time, and feeds nothing"
+    );
+    assert_eq!(
+        tell(&mut bench, 510, 2, 0x01),
+        255,
+        "200 ms after the last instruction"
     );
 }
 
