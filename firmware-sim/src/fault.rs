@@ -117,7 +117,8 @@ fn within<'de, D: serde::Deserializer<'de>>(from: D, key: &str, max: f64) -> Res
 }
 
 impl Disturbance {
-    /// Supply voltage of a servo that sags, V: above the 9.5 V at which it complains.
+    /// Supply voltage of a 12 V servo that sags, V: above the 9.5 V at which it complains. That of a model for another supply
+    /// sags in proportion.
     pub const SAG_V: f64 = 10.0;
     /// Overload, which shuts a servo down.
     pub const OVERLOAD: Self = Self::HardwareError(1 << 5);
