@@ -210,7 +210,10 @@ fn of_model(register: Register, model: &Model) -> Register {
         FIRMWARE => with(series.firmware.into(), register.range),
         BAUD => with(1, (0, series.baud_code_max.into())),
         HOMING_OFFSET if !series.centred => with(0, (-HOMING_MAX, HOMING_MAX)),
-        MOVING_THRESHOLD => with(series.moving_threshold.into(), (0, model.velocity_max.into())),
+        MOVING_THRESHOLD => {
+            let [initial, most] = series.moving_threshold;
+            with(initial.into(), (0, most.min(model.velocity_max).into()))
+        }
         TEMPERATURE_LIMIT => with(model.temperature_limit_c.into(), register.range),
         MAX_VOLTAGE => with(max_voltage, voltages),
         MIN_VOLTAGE => with(min_voltage, voltages),

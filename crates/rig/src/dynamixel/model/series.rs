@@ -28,8 +28,8 @@ pub struct Series {
     pub profile_velocity_max: u32,
     /// Whether a profile that is faster than the velocity limit is refused, rather than cut.
     pub profile_within_limit: bool,
-    /// Moving Threshold, initial value.
-    pub moving_threshold: u16,
+    /// Moving Threshold, initial value and maximum.
+    pub moving_threshold: [u32; 2],
     /// PWM Limit, initial value and maximum.
     pub pwm_limit: u16,
     /// Largest gain.
@@ -109,7 +109,7 @@ const X_TABLE: Series = Series {
     multi_turn: 1_048_575,
     profile_velocity_max: 32_767,
     profile_within_limit: false,
-    moving_threshold: 10,
+    moving_threshold: [10, 1023],
     pwm_limit: 885,
     gain_max: 16_383,
     indirect: &[
@@ -177,7 +177,7 @@ pub(super) static P: Series = Series {
     multi_turn: i32::MAX,
     profile_velocity_max: 2920,
     profile_within_limit: true,
-    moving_threshold: 20,
+    moving_threshold: [20, 2920],
     pwm_limit: 2009,
     gain_max: 32_767,
     indirect: &[Indirect {
