@@ -212,6 +212,11 @@ impl Bench {
         }
     }
 
+    /// Has the servo of an arm claim another firmware until it restarts, as one that was never updated.
+    pub fn set_firmware(&mut self, arm: Arm, version: u8) {
+        self.servos[arm as usize].set_firmware(version);
+    }
+
     /// Changes how often mishaps happen from now on, per hour; those that are not named do not happen any more.
     ///
     /// # Errors

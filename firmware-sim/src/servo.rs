@@ -197,6 +197,11 @@ impl Servo {
         }
     }
 
+    /// It claims another firmware, until it restarts.
+    pub(crate) fn set_firmware(&mut self, version: u8) {
+        self.node.table.set(reg::FIRMWARE, version.into());
+    }
+
     /// Friction, gears, load or encoder become others.
     pub(crate) fn set_mechanics(&mut self, mechanics: Mechanics) {
         self.mechanics = mechanics;

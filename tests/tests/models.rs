@@ -5,6 +5,7 @@
 
 use std::fs;
 
+use arms::Arm;
 use rig::dynamixel::MODELS;
 use tests::{Captured, Simulator, run};
 
@@ -37,8 +38,10 @@ fn simulator(light: &str, sensor: &str, more: &str) -> Simulator {
 
 /// Runs a whole job on a rig of two servos: all readings are good, and each is what the material is.
 fn measures(light: &str, sensor: &str, more: &str) {
-    let what = format!("{light} and {sensor}");
-    let simulator = simulator(light, sensor, more);
+    measures_on(&simulator(light, sensor, more), &format!("{light} and {sensor}"));
+}
+
+fn measures_on(simulator: &Simulator, what: &str) {
     let temporary = tempfile::tempdir().unwrap();
     let directory = temporary.path();
     fs::write(directory.join("job.toml"), JOB).unwrap();
@@ -106,6 +109,20 @@ fn the_doctor_tells_which_servos_there_are_and_finds_nothing_wrong_with_them() {
     for servo in ["PM54-060-S250 (id 1), firmware", "XC330-M288 (id 2), firmware"] {
         assert!(doctor.stdout.contains(servo), "{}", doctor.stdout);
     }
+}
+
+/// Before firmware 52 their indirect data are elsewhere.
+#[test]
+fn a_small_servo_of_old_firmware_is_read_register_by_register_and_told() {
+    let simulator = simulator("XL330-M288", "XL330-M077", "");
+    simulator.server.bench(|bench| bench.set_firmware(Arm::Light, 51));
+    let temporary = tempfile::tempdir().unwrap();
+    simulator.rig_file(temporary.path());
+    let doctor = run(GONIOCTL, temporary.path(), &["doctor", "--rig", "rig.toml"]).expect(0);
+    let told =
+        "the light servo (XL330-M288) has no indirect data at a known place before firmware 52, and has 51";
+    assert!(doctor.stdout.contains(told), "{}", doctor.stdout);
+    measures_on(&simulator, "an XL330-M288 of firmware 51");
 }
 
 /// Every model is told by the driver as what it is, holds as its torque comes on, and stands where it should.
