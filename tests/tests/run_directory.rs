@@ -52,6 +52,7 @@ fn quickstart_fills_a_run_directory() {
     let expected = [
         "brdf.binary",
         "brdf.uncertainty.binary",
+        "brdf.uncertainty.json",
         "factors.csv",
         "journal",
         "preview.exr",
@@ -66,6 +67,11 @@ fn quickstart_fills_a_run_directory() {
         names, expected,
         "exactly what the design names, and no temporary file"
     );
+
+    let stated = json(&directory.join("brdf.uncertainty.json"));
+    let median = stated["median_relative"].as_f64().unwrap();
+    assert!((0.02..0.5).contains(&median), "{stated}");
+    assert!(stated["flagged"].as_f64().unwrap() < 0.1, "{stated}");
 
     let run_json = json(&directory.join("run.json"));
     assert_eq!(run_json["state"], "done");

@@ -30,6 +30,7 @@
 //! ```
 
 mod albedo;
+mod alternatives;
 mod auto;
 mod bisected;
 mod bivariate;
@@ -41,6 +42,7 @@ mod error;
 mod expectation;
 mod factor;
 mod grid;
+mod in_plane;
 mod lobe;
 pub mod metric;
 mod model;
@@ -61,6 +63,7 @@ mod table;
 mod within;
 
 pub use albedo::albedo;
+pub use alternatives::Alternatives;
 pub use auto::Auto;
 pub use bivariate::Bivariate;
 pub use compare::{Comparison, Draw, compare, compare_within};
@@ -69,6 +72,7 @@ pub use density::{Density, mean_reflectance};
 pub use error::Error;
 pub use expectation::{Expectation, Signs, Worth};
 pub use factor::Factor;
+pub use in_plane::InPlane;
 pub use metric::{Channels, Metrics};
 pub use model::{Basis, FactorTable, Model};
 pub use observation::Observation;

@@ -1,6 +1,6 @@
 use pdv::{Model, Observation};
 
-use crate::MonteCarlo;
+use crate::ModelUncertainty;
 use crate::plot::{Axis, Mark, Series, svg};
 
 /// Decades of reflectance that a plot shows at most.
@@ -14,7 +14,7 @@ pub(crate) fn plane(
     theta_r: f64,
     observations: &[Observation],
     model: Option<&dyn Model>,
-    draws: Option<&MonteCarlo>,
+    uncertainty: Option<&ModelUncertainty<'_>>,
 ) -> String {
     let of_side = |outwards: bool| {
         let side = observations
@@ -28,7 +28,7 @@ pub(crate) fn plane(
         let d_p = low * (high / low).powf(f64::from(i) / f64::from(LINE));
         (d_p, theta_r, d_p)
     });
-    let [line, below, above] = band(along, model, draws);
+    let [line, below, above] = band(along, model, uncertainty);
     let series = [
         line,
         below,
@@ -48,7 +48,7 @@ pub(crate) fn arc(
     offset: f64,
     observations: &[Observation],
     model: Option<&dyn Model>,
-    draws: Option<&MonteCarlo>,
+    uncertainty: Option<&ModelUncertainty<'_>>,
 ) -> String {
     let x = Axis {
         label: "θ_r in degrees",
@@ -59,7 +59,7 @@ pub(crate) fn arc(
         let theta_r = std::f64::consts::FRAC_PI_2 * f64::from(i) / f64::from(LINE);
         (theta_r.to_degrees(), theta_r, offset)
     });
-    let [line, below, above] = band(along, model, draws);
+    let [line, below, above] = band(along, model, uncertainty);
     let dots = observations
         .iter()
         .map(|o| (o.theta_r.to_degrees(), o.rgb.to_array()));
@@ -71,7 +71,7 @@ pub(crate) fn arc(
 fn band(
     along: impl Iterator<Item = (f64, f64, f64)>,
     model: Option<&dyn Model>,
-    draws: Option<&MonteCarlo>,
+    uncertainty: Option<&ModelUncertainty<'_>>,
 ) -> [Vec<Series>; 3] {
     let mut lines: [Vec<(f64, [f64; 3])>; 3] = Default::default();
     for (x, theta_r, deviation) in along {
@@ -79,10 +79,10 @@ fn band(
             continue;
         };
         lines[0].push((x, o.rgb.to_array()));
-        let said = |model: &dyn Model| Observation::of(model, theta_r, deviation).map(|o| o.rgb);
-        if let Some(u) = draws.and_then(|draws| draws.of(said)) {
-            lines[1].push((x, (o.rgb - u).to_array()));
-            lines[2].push((x, (o.rgb + u).to_array()));
+        if let Some((uncertainty, (incident, exitant))) = uncertainty.zip(o.pdv().directions()) {
+            let factor = uncertainty.u_log(incident, exitant).map(f64::exp);
+            lines[1].push((x, (o.rgb / factor).to_array()));
+            lines[2].push((x, (o.rgb * factor).to_array()));
         }
     }
     let [line, below, above] = lines;

@@ -9,7 +9,8 @@ use rig::{Budget, Certificate, Reduction, RigFile, Taken, Unusable};
 use sweep::Sweep;
 
 use crate::run::TICK_S;
-use crate::uncertainty::{Sensitivity, expand};
+use crate::sensitivity::Sensitivity;
+use crate::uncertainty::{COVERAGE, expand};
 
 /// A reading with what follows from it.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,6 +48,14 @@ impl Measurement {
     /// PDV coordinates of the measured pose, φ_p 0 or π.
     pub fn pdv(&self) -> Pdv {
         Pdv::in_plane(self.theta_r, self.deviation)
+    }
+
+    /// Expanded uncertainty, k = 2, sr⁻¹, of whether there was light at all: counting noise, dark level and stray light, which
+    /// a reading of nothing has as well.
+    pub(crate) fn u_of_black(&self) -> Option<DVec3> {
+        let budget = self.budget?;
+        let squares = [budget.counting, budget.dark, budget.stray].map(|u| DVec3::from_array(u).powf(2.0));
+        Some(COVERAGE * squares.into_iter().sum::<DVec3>().map(f64::sqrt))
     }
 
     /// Reflectance, where there is one.

@@ -1,4 +1,3 @@
-use brdf::Brdf;
 use glam::DVec3;
 use pdv::{FactorTable, Model, Observation};
 use rand::SeedableRng;
@@ -16,13 +15,15 @@ use crate::uncertainty::{COVERAGE, zeros};
 const DRAWS: usize = 32;
 /// Draws that a table is made of, which takes a million evaluations of each: known to 18 %.
 const TABLE_DRAWS: usize = 16;
+/// The least reflectance, sr⁻¹, that has a logarithm.
+const LEAST: f64 = 1e-9;
 /// Seed, so that a run says the same whenever it is reported.
 const SEED: u64 = 0x676f_6e69_6f64;
 
 /// The reconstruction made again of readings that differ from the measured ones as they may be wrong: what a result's
 /// spread over these models is, is its uncertainty.
 ///
-/// What is common to readings stays common: responsivity, linearity, each gain step, colour mixing, stray light and the sum
+/// Errors are drawn in ln f, so that no draw is negative, and what is common to readings stays common: responsivity, linearity, each gain step, colour mixing, stray light and the sum
 /// and the difference of the arms' zeros are drawn once a draw, the lamp and the dark level once for each sweep; counting noise and an arm's angle in each reading for themselves.
 pub struct MonteCarlo {
     models: Vec<Box<dyn Model>>,
@@ -40,7 +41,7 @@ impl MonteCarlo {
                 let of_sweep: [DVec3; 2] = [normal3(&mut random), normal3(&mut random)];
                 let mut draw = |visit: &Vec<usize>| {
                     observation(measurements, visit, |m| {
-                        Some(m.rgb()? + common.error(m, of_sweep, angle, &mut random)?)
+                        drawn(m, common.error(m, of_sweep, angle, &mut random)?)
                     })
                 };
                 visits(measurements, sweep).iter().filter_map(&mut draw).collect()
@@ -72,28 +73,26 @@ impl MonteCarlo {
         (0..of.len()).map(table).collect()
     }
 
-    /// Expanded uncertainty, k = 2, of what a model says of something; `None` where a draw says nothing.
-    pub fn of(&self, value: impl Fn(&dyn Model) -> Option<DVec3>) -> Option<DVec3> {
-        let values: Option<Vec<DVec3>> = self.models.iter().map(|model| value(model.as_ref())).collect();
-        values.map(|values| expanded(&values))
-    }
-}
-
-/// As a table of uncertainties, of the first half of the draws.
-impl Brdf for MonteCarlo {
-    fn eval(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
+    /// Expanded uncertainty, k = 2, of ln f between two unit vectors, by the first half of the draws; 0 of fewer than two.
+    pub(crate) fn u_log(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
         let draws = self.models.iter().take(TABLE_DRAWS);
         let (mut n, mut mean, mut squares) = (0.0, DVec3::ZERO, DVec3::ZERO);
         // Welford's: a million times, without a list.
         for model in draws {
             n += 1.0;
-            let value = model.eval(incident, exitant);
+            let value = model.eval(incident, exitant).map(|f| f.max(LEAST).ln());
             let off = value - mean;
             mean += off / n;
             squares += off * (value - mean);
         }
         let variance = squares / f64::max(n - 1.0, 1.0);
-        COVERAGE * DVec3::from_array(variance.to_array().map(|v| v.max(0.0).sqrt()))
+        COVERAGE * variance.max(DVec3::ZERO).map(f64::sqrt)
+    }
+
+    /// Expanded uncertainty, k = 2, of what a model says of something; `None` where a draw says nothing.
+    pub fn of(&self, value: impl Fn(&dyn Model) -> Option<DVec3>) -> Option<DVec3> {
+        let values: Option<Vec<DVec3>> = self.models.iter().map(|model| value(model.as_ref())).collect();
+        values.map(|values| expanded(&values))
     }
 }
 
@@ -159,6 +158,26 @@ impl Common {
                 + m.sensitivity.aperture * self.aperture,
         )
     }
+}
+
+/// A reflectance that is off by an error, drawn in ln f: where the error is small beside it the sum of both, and above 0
+/// wherever it is not. Its spread is that of a logarithm whose reflectance has the standard uncertainty of the reading;
+/// what cannot be told from black counts as half of that.
+fn drawn(m: &Measurement, error: DVec3) -> Option<DVec3> {
+    let (f, u) = (m.rgb()?, m.u? / COVERAGE);
+    let channel = |f: f64, u: f64, error: f64| {
+        if u <= 0.0 {
+            return f;
+        }
+        let centre = f.max(0.5 * u);
+        let spread = (u / centre).powi(2).ln_1p().sqrt();
+        centre * (spread * error / u).exp()
+    };
+    Some(DVec3::new(
+        channel(f.x, u.x, error.x),
+        channel(f.y, u.y, error.y),
+        channel(f.z, u.z, error.z),
+    ))
 }
 
 fn normal(random: &mut ChaCha8Rng) -> f64 {

@@ -5,7 +5,7 @@ use sweep::Job;
 use crate::derive::Sweeps;
 use crate::page::Page;
 use crate::run::State;
-use crate::{MonteCarlo, Report, Verdict, figures, preview};
+use crate::{ModelUncertainty, Report, Verdict, figures, preview};
 
 /// What report.html shows of a run.
 pub(crate) fn page<'a>(
@@ -14,7 +14,7 @@ pub(crate) fn page<'a>(
     sweeps: &Sweeps,
     model: Option<&dyn Model>,
     truth: Option<&dyn Brdf>,
-    draws: Option<&MonteCarlo>,
+    uncertainty: Option<&ModelUncertainty<'_>>,
 ) -> Page<'a> {
     let mut pictures = Vec::new();
     let spheres: [(&str, Option<&dyn Brdf>); 2] = [
@@ -30,13 +30,13 @@ pub(crate) fn page<'a>(
     for (plane, observations) in job.planes.iter().zip(&sweeps.planes) {
         plots.push((
             "G: dots towards the normal, rings outwards, lines the model, dashed its 95 % band. Both axes logarithmic.",
-            figures::plane(plane.theta_r, observations, model, draws),
+            figures::plane(plane.theta_r, observations, model, uncertainty),
         ));
     }
     if let Some(arc) = &job.arc {
         plots.push((
             "F: the mirror arc, dots as measured, lines the model, dashed its 95 % band.",
-            figures::arc(arc.offset, &sweeps.arc, model, draws),
+            figures::arc(arc.offset, &sweeps.arc, model, uncertainty),
         ));
     }
     let mut tables = Vec::new();

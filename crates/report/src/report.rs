@@ -11,8 +11,8 @@ use sweep::{Job, LeftOut};
 use crate::derive::{Sweeps, truth};
 use crate::measurement::certificate;
 use crate::{
-    Adapted, Check, Measurement, MonteCarlo, Pace, ReportError, Run, RunDirectory, Verdict, checks,
-    measurements, outline, preview, slice, write_readings,
+    Adapted, Check, Measurement, ModelUncertainty, MonteCarlo, Pace, ReportError, Run, RunDirectory,
+    UncertaintySummary, Verdict, checks, measurements, outline, preview, slice, write_readings,
 };
 
 /// Azimuths at which the albedo of a model that is not constant along φ_p is taken.
@@ -80,8 +80,11 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
     let draws = model
         .as_ref()
         .map(|_| MonteCarlo::new(&job, &measurements, records, &rig));
-    if let (Some(model), Some(draws)) = (&model, &draws) {
-        write_model(directory, &job, model.as_ref(), draws)?;
+    let made = model.as_deref().zip(draws.as_ref());
+    let uncertainty = made.map(|(model, draws)| ModelUncertainty::new(model, &sweeps, draws));
+    if let (Some((model, draws)), Some(u)) = (made, &uncertainty) {
+        directory.write("factors.csv", |file| write_factors(model, draws, file))?;
+        write_model(directory, &job, model, u, &measurements)?;
     }
     let errors = model.as_ref().zip(truth.as_ref()).map(|(model, truth)| {
         let estimate: &dyn Brdf = model.as_ref();
@@ -107,7 +110,7 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
         &sweeps,
         model.as_deref(),
         truth.as_deref(),
-        draws.as_ref(),
+        uncertainty.as_ref(),
     );
     directory.write("report.html", |file| file.write_all(page.html().as_bytes()))?;
     Ok(report)
@@ -181,20 +184,23 @@ impl Examined {
     }
 }
 
-/// factors.csv, brdf.binary and its uncertainty, slice.exr, preview.exr and preview.png.
+/// brdf.binary, its uncertainty and what that holds, slice.exr, preview.exr and preview.png.
 fn write_model(
     directory: &RunDirectory,
     job: &Job,
     model: &dyn Model,
-    draws: &MonteCarlo,
+    uncertainty: &ModelUncertainty<'_>,
+    measurements: &[Measurement],
 ) -> Result<(), ReportError> {
-    directory.write("factors.csv", |file| write_factors(model, draws, file))?;
     let table = |of: &dyn Brdf| match &job.scene {
         Some(scene) => MerlTable::fill(&Asked { of, model, scene }),
         None => MerlTable::fill(of),
     };
-    directory.write("brdf.binary", |file| table(model).write_to(file))?;
-    directory.write("brdf.uncertainty.binary", |file| table(draws).write_to(file))?;
+    let (f, u) = (table(model), table(uncertainty));
+    directory.write("brdf.binary", |file| f.write_to(file))?;
+    directory.write("brdf.uncertainty.binary", |file| u.write_to(file))?;
+    let summary = UncertaintySummary::new(&f, &u, measurements);
+    directory.write("brdf.uncertainty.json", |file| json(file, &summary))?;
     directory.write("slice.exr", |file| slice::write(model, file))?;
     let sphere = preview::sphere(model);
     directory.write("preview.exr", |file| sphere.write_exr(file, &preview::ATTRIBUTES))?;

@@ -163,10 +163,11 @@ fn no_light(usable: &[&Measurement], c: usize) -> Option<Found> {
     })
 }
 
-/// The share of readings whose reflectance in a colour is so, given its expanded uncertainty.
+/// The share of readings whose reflectance in a colour is so, given how unsure it is whether there was light at all: what a
+/// lobe does beside it says nothing of that.
 fn share(usable: &[&Measurement], is: impl Fn(f64, f64) -> bool, c: usize) -> f64 {
     let such = usable.iter().filter(|m| {
-        let (Some(f), Some(u)) = (m.rgb(), m.u) else {
+        let (Some(f), Some(u)) = (m.rgb(), m.u_of_black()) else {
             return false;
         };
         is(f[c], u[c])

@@ -10,4 +10,5 @@ mod light;
 mod photometer;
 mod range;
 mod standards;
+mod uncertainty;
 mod verdicts;
