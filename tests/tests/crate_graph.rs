@@ -17,7 +17,7 @@ const EDGES: [(&str, &[&str]); 17] = [
     ("capture", &["sweep", "rig", "pdv"]),
     ("report", &["capture", "pdv", "brdf"]),
     ("firmware-sim", &["brdf", "arms", "rig", "terminal"]),
-    ("study", &["report", "firmware-sim"]),
+    ("study", &["report", "firmware-sim", "formats"]),
     ("session", &["report", "firmware-sim"]),
     ("api", &[]),
     ("goniod", &["session", "api"]),

@@ -36,6 +36,7 @@ mod pab_opto;
 mod principled;
 mod refinement;
 mod rgl;
+mod scattered;
 mod ssdd;
 mod tar;
 mod text;
@@ -45,6 +46,7 @@ pub use error::{Error, Place};
 pub use export::{Export, Metadata, Reading};
 pub use fidelity::{Fidelity, albedo};
 pub use format::{Exported, Format, Reader, Tolerance, read, recognise};
+pub use scattered::ScatteredReading;
 
 /// Every format, in the order in which files are recognised. A new one is a file of this crate and a line here.
 pub static FORMATS: [Format; 12] = [

@@ -233,6 +233,16 @@ pub(crate) enum Command {
     Study {
         /// The study file; the built-in config/studies/error-against-time.toml unless given.
         study: Option<PathBuf>,
+        /// Measure the materials of these files and folders instead of those that the study file names: BRDF files of any
+        /// format that can be read, and CSV files of scattered readings.
+        ///
+        /// A CSV file has a header line and the zenith angles of light and sensor and the azimuth between them in degrees
+        /// (180 is the side of the mirror direction), then the reflectance in red, green and blue in 1/sr.
+        #[arg(long, value_name = "PATH", num_args = 1..)]
+        on: Vec<PathBuf>,
+        /// Of the materials of --on, measure every N-th.
+        #[arg(long, value_name = "N", default_value_t = 1, requires = "on")]
+        every: usize,
         /// A small part of it, within a minute.
         #[arg(long)]
         quick: bool,

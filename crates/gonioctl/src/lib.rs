@@ -141,7 +141,13 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             estimate,
             output,
         } => eval::eval(&truth, &estimate, output.json)?,
-        Command::Study { study, quick, out } => study::study(study.as_deref(), quick, out)?,
+        Command::Study {
+            study,
+            on,
+            every,
+            quick,
+            out,
+        } => study::study(study.as_deref(), &on, every, quick, out)?,
         Command::Campaign {
             captures,
             seed,

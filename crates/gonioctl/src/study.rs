@@ -8,8 +8,17 @@ use indicatif::{ProgressBar, ProgressStyle};
 ///
 /// # Errors
 /// The study file is wrong, or the results cannot be written.
-pub(crate) fn study(file: Option<&Path>, quick: bool, out: Option<PathBuf>) -> anyhow::Result<()> {
-    let study = Study::read(file, quick)?;
+pub(crate) fn study(
+    file: Option<&Path>,
+    on: &[PathBuf],
+    every: usize,
+    quick: bool,
+    out: Option<PathBuf>,
+) -> anyhow::Result<()> {
+    let mut study = Study::read(file, quick)?;
+    if !on.is_empty() {
+        study = study.on(on, every)?;
+    }
     let directory = out.unwrap_or_else(|| Path::new("studies").join(name(file, quick)));
     let style = ProgressStyle::with_template("[{bar:30}] {percent} %, {elapsed} taken, {eta} left")?;
     let bar = ProgressBar::new(0).with_style(style.progress_chars("=> "));
@@ -27,7 +36,9 @@ pub(crate) fn study(file: Option<&Path>, quick: bool, out: Option<PathBuf>) -> a
         }
     })?;
     bar.finish_and_clear();
-    terminal::say(found);
+    for line in found.lines() {
+        terminal::say(line);
+    }
     terminal::line(directory.display())?;
     Ok(())
 }

@@ -45,6 +45,22 @@ pub enum Error {
         /// Which material, and what is near it.
         source: brdf::Error,
     },
+    /// A file of a material cannot be read.
+    #[error("the material of {path} cannot be read")]
+    File {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: Box<formats::Error>,
+    },
+    /// Scattered readings in the plane do not make a specimen for the simulated rig.
+    #[error("{material}: the readings in the plane make no specimen")]
+    Scattered {
+        /// Which material.
+        material: String,
+        /// Why.
+        source: pdv::Error,
+    },
     /// A directory is in use for something else.
     #[error("{directory} holds another study; name another directory")]
     OtherStudy {

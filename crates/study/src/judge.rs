@@ -1,3 +1,4 @@
+use std::borrow::Cow;
 use std::f64::consts::TAU;
 
 use brdf::{Brdf, Spherical};
@@ -6,6 +7,8 @@ use pdv::Draw;
 use pdv::metric::{absolute_log_error, quantile, relative_error};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+
+use crate::Material;
 
 /// Pairs of directions, drawn once, on which many estimates are judged.
 #[derive(Clone, Debug)]
@@ -43,6 +46,33 @@ impl Judge {
         Self {
             pairs: pairs.collect(),
         }
+    }
+
+    /// Pairs in one plane with the normal, light and viewer on either side of it.
+    pub(crate) fn in_plane(draw: &Draw) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(draw.seed);
+        let mut direction = || {
+            let theta = (2.0 * rng.random::<f64>() - 1.0) * draw.theta_max;
+            DVec3::new(theta.sin(), 0.0, theta.cos())
+        };
+        Self {
+            pairs: (0..draw.pairs).map(|_| (direction(), direction())).collect(),
+        }
+    }
+
+    /// On which pairs a material is judged, and what it is there: these, or where scattered readings are all that is known
+    /// of it, those with both angles up to `theta_max`, rad.
+    pub(crate) fn of<'a>(&'a self, material: &Material, theta_max: f64) -> (Cow<'a, Self>, Vec<DVec3>) {
+        let Some(readings) = &material.known else {
+            return (Cow::Borrowed(self), self.values(material.brdf.as_ref()));
+        };
+        let below = readings
+            .iter()
+            .filter(|reading| reading.light.max(reading.sensor) <= theta_max);
+        let (pairs, values) = below
+            .map(|reading| (reading.directions(), reading.rgb.max(DVec3::ZERO)))
+            .unzip();
+        (Cow::Owned(Self { pairs }), values)
     }
 
     pub(crate) fn pairs(&self) -> &[(DVec3, DVec3)] {

@@ -9,6 +9,7 @@
 mod campaign;
 mod check;
 mod error;
+mod family;
 mod figure;
 mod grid;
 mod judge;
@@ -17,6 +18,7 @@ mod material;
 mod measure;
 mod page;
 mod paper;
+mod specimen_file;
 mod statistics;
 mod study;
 mod write;
@@ -26,7 +28,7 @@ pub use error::Error;
 pub use grid::{Grid, GridPlan, GridRow, Source};
 pub use judge::Score;
 pub use material::Material;
-pub use measure::{Measured, measure};
+pub use measure::{Capture, Measured, measure};
 pub use paper::{Angle, Evaluation, Nodes, Row, Summary};
 pub use study::{Kind, Progress, Study};
 

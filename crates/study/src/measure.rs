@@ -37,11 +37,7 @@ pub struct Measured {
 /// # Errors
 /// The rig cannot do the job, or the capture failed.
 pub fn measure(job: &Job, rig: &RigFile, specimen: Arc<dyn Brdf>) -> Result<Measured, Error> {
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_time()
-        .start_paused(true)
-        .build()?;
-    let (records, bus_s) = runtime.block_on(records(job, rig, specimen))?;
+    let Capture { records, bus_s } = Capture::new(job, rig, specimen)?;
     let measurements = report::measurements(&records, rig);
     let plan = capture::extended_plan(&records);
     let planes = plan.map_or(job.planes.len(), |plan| job.grown(&plan).planes.len());
@@ -65,6 +61,30 @@ pub fn measure(job: &Job, rig: &RigFile, specimen: Arc<dyn Brdf>) -> Result<Meas
         arc,
         adapted: report::Adapted::new(&records),
     })
+}
+
+/// A capture on the simulated rig as its journal has it.
+#[derive(Clone, Debug)]
+pub struct Capture {
+    /// The journal's records.
+    pub records: Vec<Record>,
+    /// Seconds that an exposure needs on the bus.
+    pub bus_s: f64,
+}
+
+impl Capture {
+    /// Captures a job as [`measure`] does.
+    ///
+    /// # Errors
+    /// As for [`measure`].
+    pub fn new(job: &Job, rig: &RigFile, specimen: Arc<dyn Brdf>) -> Result<Self, Error> {
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_time()
+            .start_paused(true)
+            .build()?;
+        let (records, bus_s) = runtime.block_on(records(job, rig, specimen))?;
+        Ok(Self { records, bus_s })
+    }
 }
 
 /// The records of a capture, and the seconds that an exposure needs on the bus.

@@ -1,16 +1,21 @@
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
 use crate::check::Check;
-use crate::{Error, Evaluation, Grid, grid, paper, write};
+use crate::{Error, Evaluation, Grid, Material, grid, paper, write};
 
 /// Told how much of the work is done, and of how much; from any thread.
 pub type Progress<'a> = dyn Fn(u64, u64) + Sync + 'a;
 
 /// The study that is run unless a file says otherwise.
 const BUILT_IN: &str = include_str!("../../../config/studies/error-against-time.toml");
+
+/// How the copy of a quick study's file begins.
+const QUICK: &str = "# quick\n";
+/// Materials that a quick study measures at most.
+const QUICK_MATERIALS: usize = 8;
 
 /// What a study file asks for: its key `study`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
@@ -62,11 +67,57 @@ impl Study {
             Kind::ErrorAgainstTime => What::Grid(Grid::parse(text, file, quick)?),
             Kind::Paper => What::Evaluation(Evaluation::parse(text, file, quick)?),
         };
-        let quick = if quick { "# quick\n" } else { "" };
+        let quick = if quick { QUICK } else { "" };
         Ok(Self {
             what,
             text: format!("{quick}{text}"),
         })
+    }
+
+    /// The same study over the materials of files and folders instead of those that its file names, every n-th of them, and
+    /// of a quick one no more than eight.
+    ///
+    /// # Errors
+    /// A file or folder that cannot be read ([`Material::read_all`]), no material at all, `every` of 0, or a study of
+    /// another kind than error against run time.
+    pub fn on(mut self, paths: &[PathBuf], every: usize) -> Result<Self, Error> {
+        let file = "the command line";
+        let range = |key, value: String, allowed| Error::Range {
+            file: file.to_owned(),
+            key,
+            value,
+            allowed,
+        };
+        let What::Grid(grid) = &mut self.what else {
+            return Err(range(
+                "--on",
+                "given".to_owned(),
+                "a study of error against run time",
+            ));
+        };
+        let mut known = Vec::new();
+        for path in paths {
+            known.extend(Material::read_all(path)?);
+        }
+        if known.is_empty() {
+            return Err(range(
+                "--on",
+                "empty".to_owned(),
+                "at least one file of a material",
+            ));
+        }
+        if every == 0 {
+            return Err(range("--every", "0".to_owned(), "1 …"));
+        }
+        let every = match self.text.starts_with(QUICK) {
+            true => every.max(known.len().div_ceil(QUICK_MATERIALS)),
+            false => every,
+        };
+        grid.materials = known.iter().step_by(every).cloned().collect();
+        grid.known = known;
+        let paths: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
+        self.text = format!("{}# on every {every} of {}\n", self.text, paths.join(", "));
+        Ok(self)
     }
 
     /// Runs it into a directory, which is made where it is missing, and says what it found. A study that was

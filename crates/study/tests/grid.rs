@@ -12,7 +12,7 @@ every = 2
 models = [\"separable\", \"reciprocal\", \"planes\"]
 plans = { planes_deg = [[30.0]], readings = [8], distribution = \"capped\", arc = [0, 8] }
 adaptive = { planes_deg = [20.0, 70.0], readings = 8, arc = 8, budget_s = [30] }
-pca = { readings = [2], folds = 3 }
+pca = { readings = [2] }
 compare = { pairs = 500, theta_max_deg = 80.0, seed = 3 }
 ";
 
@@ -31,15 +31,16 @@ fn an_interrupted_study_ends_as_a_whole_one_does() {
     let directory = tempfile::tempdir().unwrap();
     let study = Study::parse(TEXT, "study.toml", false).unwrap();
     let words = study.run(directory.path(), &|_, _| ()).unwrap();
-    assert!(words.contains("2 materials, 6 captures"), "{words}");
+    assert!(words.contains("2 materials of 2 families, 6 captures"), "{words}");
     assert!(words.contains("planned on the way, "), "{words}");
     let whole = rows(directory.path());
-    // Two plans with two models each, one made on the way, the floor of both models, black and PCA; two materials; the
-    // heading.
-    assert_eq!(whole.len(), 2 * (4 + 1 + 2 + 2) + 1);
+    // Two plans with two models each, one made on the way, the floor of both models, black and PCA placed freely and in the
+    // plane; two materials; the heading.
+    assert_eq!(whole.len(), 2 * (4 + 1 + 2 + 3) + 1);
     for name in [
         "front.csv",
         "floor.csv",
+        "families.csv",
         "summary.json",
         "male-against-time.png",
         "planes-against-time.svg",
@@ -87,4 +88,72 @@ fn the_shipped_study_covers_the_grid() {
     );
     assert!(error("every = 5", "evry = 5").contains("evry"));
     assert!(error("materials = \"all\"", "materials = [\"chrom\"]").contains("materials"));
+}
+
+/// A table of a format and scattered readings are materials like any other, and each is held out with its family.
+#[test]
+fn a_study_is_done_on_the_materials_of_a_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: String| fs::write(folder.path().join(name), text).unwrap();
+    let rubber = brdf::Fitted::named("blue-rubber").unwrap();
+    brdf::MerlTable::fill(&rubber)
+        .write(&folder.path().join("blue-rubber.binary"))
+        .unwrap();
+    let gold = brdf::Fitted::named("gold-paint").unwrap();
+    let mut readings = "light_deg,sensor_deg,azimuth_deg,r,g,b\n".to_owned();
+    let mut add = |light: f64, sensor: f64, azimuth: f64| {
+        let direction = |theta: f64, phi: f64| {
+            let (theta, phi) = (theta.to_radians(), phi.to_radians());
+            brdf::Spherical { theta, phi }.direction()
+        };
+        let f = brdf::Brdf::eval(&gold, direction(light, azimuth), direction(sensor, 0.0));
+        readings += &format!("{light},{sensor},{azimuth},{},{},{}\n", f.x, f.y, f.z);
+    };
+    for light in [0.0, 20.0, 40.0, 60.0] {
+        for sensor in 0..80 {
+            add(light, f64::from(sensor), 180.0);
+            add(light, f64::from(sensor), 0.0);
+            add(light, f64::from(sensor), 70.0);
+        }
+    }
+    write("measured.csv", readings);
+
+    let directory = tempfile::tempdir().unwrap();
+    let text = TEXT.replace(
+        "adaptive = { planes_deg = [20.0, 70.0], readings = 8, arc = 8, budget_s = [30] }\n",
+        "",
+    );
+    let study = Study::parse(&text, "study.toml", false).unwrap();
+    let study = study.on(&[folder.path().to_owned()], 1).unwrap();
+    let words = study.run(directory.path(), &|_, _| ()).unwrap();
+    assert!(words.contains("2 materials of 2 families"), "{words}");
+    let found = rows(directory.path());
+    let of =
+        |material: &str| -> Vec<&Vec<String>> { found.iter().filter(|row| row[0] == material).collect() };
+    assert!(
+        of("blue-rubber")
+            .iter()
+            .all(|row| row.last().unwrap() == "rubber"),
+        "{found:?}"
+    );
+    // Not listed: of the family of its folder.
+    let folder_name = folder.path().file_name().unwrap().to_string_lossy().into_owned();
+    assert!(
+        !of("measured").is_empty()
+            && of("measured")
+                .iter()
+                .all(|row| *row.last().unwrap() == folder_name)
+    );
+    // The floor of scattered readings of a material that the model knows well is at those readings, out of the plane too.
+    let floor = of("measured")
+        .into_iter()
+        .find(|row| row[1] == "floor" && row[6] == "reciprocal");
+    let male: f64 = floor.expect("there is a floor")[10].parse().unwrap();
+    assert!(male < 0.01, "{male}");
+    // Without another family there is nothing to learn from.
+    assert!(!words.contains("PCA"), "{words}");
+
+    let other = Study::parse(&text, "study.toml", false).unwrap();
+    let error = other.run(directory.path(), &|_, _| ()).unwrap_err();
+    assert!(error.to_string().contains("another study"), "{error}");
 }

@@ -1,8 +1,9 @@
 use brdf::Black;
+use glam::DVec3;
 use pdv::{Observation, light_angle};
 use rayon::prelude::*;
 
-use super::pca::Pca;
+use super::pca::{Pca, Placement};
 use super::{Grid, GridRow, Source};
 use crate::judge::{Judge, Score};
 use crate::{Error, Material};
@@ -29,41 +30,81 @@ pub(crate) fn rows(grid: &Grid, judge: &Judge) -> Vec<GridRow> {
         male: score.male,
         median_rel: score.median_rel,
         p95_rel: score.p95_rel,
+        family: material.family.clone(),
     };
-    let black = judge.values(&Black);
     let mut rows: Vec<GridRow> = grid
         .materials
         .iter()
         .map(|material| {
-            let reference = judge.values(material.brdf.as_ref());
+            let (judge, reference) = judge.of(material, grid.draw.theta_max);
+            let black = judge.values(&Black);
             row(material, "black".to_owned(), 0, judge.score(&reference, &black))
         })
         .collect();
-    let pca = Pca::new(&grid.known, judge, &grid.draw);
-    let folds: Vec<_> = (0..grid.folds)
-        .into_par_iter()
-        .map(|fold| pca.fold(fold, grid.folds, &grid.pca))
+    // Of scattered readings alone there is nothing where PCA would have its own.
+    let known: Vec<&Material> = grid
+        .known
+        .iter()
+        .filter(|material| material.known.is_none())
         .collect();
-    for (material, n, score) in folds.into_iter().flatten() {
-        let material = &grid.known[material];
-        // Those that are not measured are only learnt from.
-        if grid
-            .materials
-            .iter()
-            .any(|measured| measured.name == material.name)
-        {
-            rows.push(row(material, format!("pca-{n}"), n, score));
+    for placement in Placement::ALL {
+        let pca = Pca::new(&known, judge, &grid.draw, placement);
+        let found: Vec<_> = families(&known)
+            .into_par_iter()
+            .map(|family| pca.without(family, &grid.pca))
+            .collect();
+        for (material, n, score) in found.into_iter().flatten() {
+            // Those that are not measured are only learnt from.
+            if measured(grid, known[material]) {
+                rows.push(row(known[material], placement.model(n), n, score));
+            }
         }
     }
     rows
+}
+
+/// How many rows [`rows`] makes.
+pub(crate) fn count(grid: &Grid) -> usize {
+    let tested = |material: &&Material| material.known.is_none() && measured(grid, material);
+    let known: Vec<&Material> = grid
+        .known
+        .iter()
+        .filter(|material| material.known.is_none())
+        .collect();
+    let of_pca = match families(&known).len() > 1 {
+        true => known.into_iter().filter(tested).count() * grid.pca.len() * Placement::ALL.len(),
+        false => 0,
+    };
+    grid.materials.len() + of_pca
+}
+
+fn measured(grid: &Grid, material: &Material) -> bool {
+    grid.materials
+        .iter()
+        .any(|measured| measured.name == material.name)
+}
+
+/// The families of some materials.
+fn families<'a>(materials: &[&'a Material]) -> Vec<&'a str> {
+    let mut families: Vec<&str> = materials
+        .iter()
+        .map(|material| material.family.as_str())
+        .collect();
+    families.sort_unstable();
+    families.dedup();
+    families
 }
 
 /// What each model makes of the readings of a perfect instrument, on each set of planes.
 ///
 /// # Errors
 /// A model cannot be made.
-pub(crate) fn floor(grid: &Grid, judge: &Judge, material: &Material) -> Result<Vec<GridRow>, Error> {
-    let reference = judge.values(material.brdf.as_ref());
+pub(crate) fn floor(
+    grid: &Grid,
+    judge: &Judge,
+    reference: &[DVec3],
+    material: &Material,
+) -> Result<Vec<GridRow>, Error> {
     let mut sets: Vec<&[f64]> = grid.fixed().map(|plan| plan.planes_deg.as_slice()).collect();
     sets.dedup();
     let arc: Vec<Observation> = (0..DENSE)
@@ -90,7 +131,7 @@ pub(crate) fn floor(grid: &Grid, judge: &Judge, material: &Material) -> Result<V
                 source,
             })?;
             let fit_s = begun.elapsed().as_secs_f64();
-            let score = judge.score(&reference, &judge.values(made.as_ref()));
+            let score = judge.score(reference, &judge.values(made.as_ref()));
             rows.push(GridRow {
                 material: material.name.clone(),
                 source: Source::Floor,
@@ -106,6 +147,7 @@ pub(crate) fn floor(grid: &Grid, judge: &Judge, material: &Material) -> Result<V
                 male: score.male,
                 median_rel: score.median_rel,
                 p95_rel: score.p95_rel,
+                family: material.family.clone(),
             });
         }
     }

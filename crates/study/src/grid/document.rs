@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use super::figures::figures;
-use super::front::Line;
+use super::front::{FamilyLine, Line};
 use super::outcome::Outcome;
 use super::summary::{Pca, Summary};
 use super::words::words;
@@ -17,6 +17,7 @@ pub(crate) fn write(grid: &Grid, rows: &[GridRow], directory: &Path) -> Result<S
         let text = ledger::text(lines, true).map_err(Error::Write)?;
         write::file(directory, name, &text)
     };
+    write::file(directory, "families.csv", &families_csv(&summary.families)?)?;
     let text = ledger::text(rows, true).map_err(Error::Write)?;
     write::file(directory, "study.csv", &text)?;
     csv("front.csv", &outcome.lines())?;
@@ -36,7 +37,9 @@ pub(crate) fn write(grid: &Grid, rows: &[GridRow], directory: &Path) -> Result<S
     page.table(&table(&summary.front));
     page.heading("Floors: the same models from 360 + 360 readings of a perfect instrument");
     page.table(&table(&summary.floors));
-    page.heading("Log-relative PCA, readings anywhere on the hemisphere, without noise");
+    page.heading("The plans of the front by family of materials");
+    page.table(&family_table(&summary.families));
+    page.heading("Log-relative PCA, learnt from all other families, its readings without noise");
     page.table(&pca_table(&summary.pca));
     write::file(directory, "index.html", page.html().as_bytes())?;
     Ok(words)
@@ -63,7 +66,7 @@ fn table(lines: &[Line]) -> Vec<Vec<String>> {
             false => "–".to_owned(),
         };
         rows.push(vec![
-            line.family.clone(),
+            line.approach.clone(),
             line.planes_deg.clone(),
             line.readings.to_string(),
             line.arc.to_string(),
@@ -82,8 +85,11 @@ fn table(lines: &[Line]) -> Vec<Vec<String>> {
 fn pca_table(pca: &[Pca]) -> Vec<Vec<String>> {
     let heading = [
         "readings",
+        "placed",
         "MALE mean",
         "median",
+        "10 %",
+        "90 %",
         "median rel. error",
         "front is below from",
     ];
@@ -91,12 +97,72 @@ fn pca_table(pca: &[Pca]) -> Vec<Vec<String>> {
     for pca in pca {
         rows.push(vec![
             pca.readings.to_string(),
+            pca.placed.to_owned(),
             format!("{:.5}", pca.male_mean),
             format!("{:.5}", pca.male_median),
+            format!("{:.5}", pca.male_p10),
+            format!("{:.5}", pca.male_p90),
             format!("{:.2} %", 100.0 * pca.median_rel),
             pca.beaten_from_s
                 .map_or("nowhere".to_owned(), |s| format!("{s:.0} s")),
         ]);
     }
     rows
+}
+
+/// Columns of families.csv and of the table by family.
+const BY_FAMILY: [&str; 11] = [
+    "family",
+    "materials",
+    "model",
+    "planes_deg",
+    "readings",
+    "arc",
+    "male_mean",
+    "male_median",
+    "male_p10",
+    "male_p90",
+    "median_rel",
+];
+
+fn by_family(line: &FamilyLine) -> [String; 11] {
+    let FamilyLine {
+        family,
+        materials,
+        line,
+    } = line;
+    let error = |value: f64| format!("{value:.6}");
+    [
+        family.clone(),
+        materials.to_string(),
+        line.approach.clone(),
+        line.planes_deg.clone(),
+        line.readings.to_string(),
+        line.arc.to_string(),
+        error(line.male_mean),
+        error(line.male_median),
+        error(line.male_p10),
+        error(line.male_p90),
+        error(line.median_rel),
+    ]
+}
+
+/// families.csv.
+fn families_csv(lines: &[FamilyLine]) -> Result<Vec<u8>, Error> {
+    let failed = |error: csv::Error| Error::Write(error.into());
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    writer.write_record(BY_FAMILY).map_err(failed)?;
+    for line in lines {
+        writer.write_record(by_family(line)).map_err(failed)?;
+    }
+    writer
+        .into_inner()
+        .map_err(|error| Error::Write(std::io::Error::other(error.to_string())))
+}
+
+fn family_table(lines: &[FamilyLine]) -> Vec<Vec<String>> {
+    let rows = lines.iter().map(|line| by_family(line).to_vec());
+    std::iter::once(BY_FAMILY.map(str::to_owned).to_vec())
+        .chain(rows)
+        .collect()
 }

@@ -38,24 +38,24 @@ pub(crate) fn figures(outcome: &Outcome<'_>, summary: &Summary) -> Vec<(&'static
 fn figure(outcome: &Outcome<'_>, title: &str, label: &'static str, of: impl Fn(&Point) -> Band) -> Figure {
     let own = outcome.own();
     let all: Vec<(f64, f64)> = outcome
-        .families
+        .approaches
         .iter()
-        .filter(|family| family.own)
-        .flat_map(|family| &family.points)
+        .filter(|approach| approach.own)
+        .flat_map(|approach| &approach.points)
         .map(|point| (point.rig_s, of(point).median))
         .collect();
     let mut curves = vec![Curve::new("", [150, 190, 225], Mark::Dots, all)];
     let mut colours = COLOURS.iter().skip(1).copied().cycle();
-    for family in outcome.families.iter().filter(|family| !family.own) {
-        let steps = steps(&front(&family.points), &of);
+    for approach in outcome.approaches.iter().filter(|approach| !approach.own) {
+        let steps = steps(&front(&approach.points), &of);
         let colour = colours.next().expect("it goes round");
         curves.push(Curve {
-            band: if family.name == "separable at 70°" {
+            band: if approach.name == "separable at 70°" {
                 steps.1
             } else {
                 Vec::new()
             },
-            ..Curve::new(&family.name, colour, Mark::Line, steps.0)
+            ..Curve::new(&approach.name, colour, Mark::Line, steps.0)
         });
     }
     let level = |name: &str, colour, model: &str| {
@@ -117,10 +117,10 @@ fn figure(outcome: &Outcome<'_>, title: &str, label: &'static str, of: impl Fn(&
 fn by_planes(outcome: &Outcome<'_>, summary: &Summary) -> Figure {
     let count = |planes: &str| planes.split(' ').count();
     let own: Vec<&Point> = outcome
-        .families
+        .approaches
         .iter()
-        .filter(|family| family.own)
-        .flat_map(|family| &family.points)
+        .filter(|approach| approach.own)
+        .flat_map(|approach| &approach.points)
         .collect();
     let mut numbers: Vec<usize> = own.iter().map(|point| count(&point.planes_deg)).collect();
     numbers.sort_unstable();
@@ -144,7 +144,7 @@ fn by_planes(outcome: &Outcome<'_>, summary: &Summary) -> Figure {
             .floors
             .iter()
             .filter(|line| count(&line.planes_deg) == number)
-            .filter(|line| !matches!(line.family.as_str(), "separable" | "bivariate"))
+            .filter(|line| !matches!(line.approach.as_str(), "separable" | "bivariate"))
             .map(|line| line.male_median)
             .fold(f64::INFINITY, f64::min);
         let line = vec![(FROM_S / 2.0, floor), (TO_S, floor)];

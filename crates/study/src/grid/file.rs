@@ -20,10 +20,8 @@ pub struct Grid {
     pub plans: Vec<GridPlan>,
     /// What is made of it.
     pub models: Vec<Model>,
-    /// Numbers of readings of log-relative PCA.
+    /// Numbers of readings of log-relative PCA, whose basis is made of the materials of all other families.
     pub pca: Vec<usize>,
-    /// Folds of its cross-validation.
-    pub folds: usize,
     /// On which pairs all are judged; its seed is that of the captures, too.
     pub draw: Draw,
 }
@@ -64,7 +62,6 @@ struct RawAdaptive {
 #[serde(deny_unknown_fields)]
 struct RawPca {
     readings: Vec<usize>,
-    folds: usize,
 }
 
 #[derive(Deserialize)]
@@ -97,7 +94,6 @@ impl Grid {
         check.list("plans.readings", &plans.readings, |n| n > 0, "1 … 2000")?;
         check.list("plans.arc", &plans.arc, |n| n <= 2000, "0 … 2000")?;
         check.list("pca.readings", &raw.pca.readings, |n| n > 0, "1 …")?;
-        check.number("pca.folds", raw.pca.folds, raw.pca.folds > 1, "2 …")?;
         let RawCompare {
             pairs,
             theta_max_deg,
@@ -144,7 +140,6 @@ impl Grid {
             plans: cells,
             models: raw.models,
             pca: raw.pca.readings,
-            folds: raw.pca.folds,
             draw: Draw {
                 pairs: if quick { pairs.div_ceil(5) } else { pairs },
                 theta_max: theta_max_deg.to_radians(),

@@ -29,7 +29,7 @@ pub(crate) struct Point {
 /// One line of front.csv.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Line {
-    pub(crate) family: String,
+    pub(crate) approach: String,
     pub(crate) rig_s: f64,
     pub(crate) fit_s: f64,
     pub(crate) planes_deg: String,
@@ -42,9 +42,18 @@ pub(crate) struct Line {
     pub(crate) median_rel: f64,
 }
 
+/// A plan of the front over the materials of one family: one line of families.csv.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct FamilyLine {
+    pub(crate) family: String,
+    pub(crate) materials: usize,
+    #[serde(flatten)]
+    pub(crate) line: Line,
+}
+
 /// Curves that are compared: the program's own models together, and each baseline.
 #[derive(Clone, Debug)]
-pub(crate) struct Family {
+pub(crate) struct Approach {
     pub(crate) name: String,
     /// Whether it is one of the program's models, not a baseline.
     pub(crate) own: bool,
@@ -84,9 +93,9 @@ pub(crate) fn adaptive(rows: &[GridRow]) -> Vec<Point> {
     points
 }
 
-/// The points of the rig with fixed plans by family: baselines are the paper's model at each angle, and the bivariate table.
-pub(crate) fn families(rows: &[GridRow]) -> Vec<Family> {
-    let mut families: Vec<Family> = Vec::new();
+/// The points of the rig with fixed plans by approach: baselines are the paper's model at each angle, and the bivariate table.
+pub(crate) fn approaches(rows: &[GridRow]) -> Vec<Approach> {
+    let mut approaches: Vec<Approach> = Vec::new();
     let fixed = |point: &Point| point.budget_s.is_none();
     for point in points(rows, Source::Rig).into_iter().filter(fixed) {
         let (name, own) = match point.model.as_str() {
@@ -94,17 +103,17 @@ pub(crate) fn families(rows: &[GridRow]) -> Vec<Family> {
             "bivariate" => ("bivariate".to_owned(), false),
             model => (model.to_owned(), true),
         };
-        match families.iter_mut().find(|family| family.name == name) {
-            Some(family) => family.points.push(point),
-            None => families.push(Family {
+        match approaches.iter_mut().find(|approach| approach.name == name) {
+            Some(approach) => approach.points.push(point),
+            None => approaches.push(Approach {
                 name,
                 own,
                 points: vec![point],
             }),
         }
     }
-    families.sort_by_key(|family| (!family.own, family.name.clone()));
-    families
+    approaches.sort_by_key(|approach| (!approach.own, approach.name.clone()));
+    approaches
 }
 
 /// The points that no other reaches in less time, by the median of MALE: ascending in time, descending in error.
@@ -133,9 +142,9 @@ pub(crate) fn within<'a>(front: &[&'a Point], seconds: f64) -> Option<&'a Point>
 }
 
 impl Point {
-    pub(crate) fn line(&self, family: &str) -> Line {
+    pub(crate) fn line(&self, approach: &str) -> Line {
         Line {
-            family: family.to_owned(),
+            approach: approach.to_owned(),
             rig_s: self.rig_s,
             fit_s: self.fit_s,
             planes_deg: self.planes_deg.clone(),
@@ -147,6 +156,20 @@ impl Point {
             male_p90: self.male.p90,
             median_rel: self.median_rel.median,
         }
+    }
+
+    /// Whether another point is of the same plan and model.
+    pub(crate) fn same_plan(&self, other: &Self) -> bool {
+        let of = |point: &Self| (point.readings, point.arc, point.budget_s);
+        self.planes_deg == other.planes_deg && self.model == other.model && of(self) == of(other)
+    }
+
+    /// Whether a row of the rig is one of its own.
+    pub(crate) fn holds(&self, row: &GridRow) -> bool {
+        row.source == Source::Rig
+            && row.model == self.model
+            && row.planes_deg == self.planes_deg
+            && (row.readings, row.arc, row.budget_s) == (self.readings, self.arc, self.budget_s)
     }
 
     /// What is done, in words.

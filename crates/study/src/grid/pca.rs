@@ -12,20 +12,50 @@ const ETA: f64 = 1e-3;
 /// Pairs of directions among which the readings are placed.
 const PLACES: u64 = 4000;
 
+/// Where readings may be placed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Placement {
+    /// Anywhere on the hemisphere.
+    Free,
+    /// In one plane with the normal, where a rig of two arms can stand.
+    Plane,
+}
+
+impl Placement {
+    pub(crate) const ALL: [Self; 2] = [Self::Free, Self::Plane];
+
+    /// What rows call the model of so many readings.
+    pub(crate) fn model(self, readings: usize) -> String {
+        match self {
+            Self::Free => format!("pca-{readings}"),
+            Self::Plane => format!("pca-{readings}-in-plane"),
+        }
+    }
+
+    /// Where the readings stand, in words.
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            Self::Free => "anywhere on the hemisphere",
+            Self::Plane => "in the plane of the arms",
+        }
+    }
+}
+
 /// Log-relative PCA: what a few readings anywhere on the hemisphere tell, for a material like those of a database.
 ///
 /// Every channel of every training material is one column x = ln((f w + ε)/(m w + ε)), m the median over the columns
 /// and w = max(cos θ_i cos θ_o, ε). The readings are placed by QR with column pivoting of the scaled basis; they are
-/// free of noise and cost no time. So it is at its best here, and the materials are of the same kind as those that it
-/// was trained on.
+/// free of noise and cost no time. A material is reconstructed from those of all other families, so that what it is made
+/// of is known from no sister.
 pub(crate) struct Pca<'a> {
+    materials: &'a [&'a Material],
     judge: &'a Judge,
     places: Judge,
     /// Values of every material, at the places and at the pairs of the judge.
     values: Vec<[Vec<DVec3>; 2]>,
 }
 
-/// What the training materials of one fold teach.
+/// What the training materials of all families but one teach.
 struct Basis {
     /// Median over the columns, at places and pairs.
     middle: [Vec<f64>; 2],
@@ -36,13 +66,22 @@ struct Basis {
 }
 
 impl<'a> Pca<'a> {
-    pub(crate) fn new(materials: &[Material], judge: &'a Judge, draw: &Draw) -> Self {
-        let places = Judge::new(&Draw {
+    pub(crate) fn new(
+        materials: &'a [&'a Material],
+        judge: &'a Judge,
+        draw: &Draw,
+        placement: Placement,
+    ) -> Self {
+        let draw = Draw {
             pairs: PLACES,
             theta_max: draw.theta_max,
             // Other pairs than those that it is judged on.
             seed: !draw.seed,
-        });
+        };
+        let places = match placement {
+            Placement::Free => Judge::new(&draw),
+            Placement::Plane => Judge::in_plane(&draw),
+        };
         let values = materials.iter().map(|material| {
             [
                 places.values(material.brdf.as_ref()),
@@ -50,17 +89,17 @@ impl<'a> Pca<'a> {
             ]
         });
         Self {
+            materials,
             judge,
             values: values.collect(),
             places,
         }
     }
 
-    /// Scores of the materials whose index leaves `fold` modulo `folds`, for each number of readings; the others are
-    /// the training.
-    pub(crate) fn fold(&self, fold: usize, folds: usize, readings: &[usize]) -> Vec<(usize, usize, Score)> {
+    /// Scores of the materials of a family by their index, for each number of readings, learnt from all others.
+    pub(crate) fn without(&self, family: &str, readings: &[usize]) -> Vec<(usize, usize, Score)> {
         let (tested, training): (Vec<usize>, Vec<usize>) =
-            (0..self.values.len()).partition(|material| material % folds == fold);
+            (0..self.values.len()).partition(|&material| self.materials[material].family == family);
         if training.is_empty() {
             return Vec::new();
         }

@@ -43,6 +43,8 @@ pub struct GridRow {
     pub median_rel: f64,
     /// See [`crate::Score`].
     pub p95_rel: f64,
+    /// Family of the material.
+    pub family: String,
 }
 
 /// What tells a row from every other: material, source, planes, readings, arc, budget and model.

@@ -55,10 +55,11 @@ pub(crate) fn run(grid: &Grid, directory: &Path, progress: &Progress<'_>) -> Res
     let done = AtomicU64::new(0);
     progress(0, total);
     tasks.par_iter().try_for_each(|task| -> Result<(), Error> {
-        let reference = judge.values(task.material().brdf.as_ref());
+        let material = task.material();
+        let (judge, reference) = judge.of(material, grid.draw.theta_max);
         let rows = match task {
-            Task::Capture(material, plan) => captured(grid, &judge, &reference, material, plan)?,
-            Task::Floor(material) => baseline::floor(grid, &judge, material)?,
+            Task::Capture(_, plan) => captured(grid, &judge, &reference, material, plan)?,
+            Task::Floor(_) => baseline::floor(grid, &judge, &reference, material)?,
         };
         ledger.lock().expect("nobody panics with it").append(&rows)?;
         progress(
@@ -68,7 +69,7 @@ pub(crate) fn run(grid: &Grid, directory: &Path, progress: &Progress<'_>) -> Res
         Ok(())
     })?;
     let mut ledger = ledger.into_inner().expect("nobody panics with it");
-    let baselines = grid.materials.len() * (1 + grid.pca.len());
+    let baselines = baseline::count(grid);
     if known.iter().filter(|key| key.1 == Source::Baseline).count() < baselines {
         ledger.append(&baseline::rows(grid, &judge))?;
     }
@@ -155,6 +156,7 @@ fn captured(
                 male: score.male,
                 median_rel: score.median_rel,
                 p95_rel: score.p95_rel,
+                family: material.family.clone(),
             })
         })
         .collect()

@@ -1,7 +1,8 @@
 use serde::Serialize;
 
-use super::front::{Line, Point, front, within};
+use super::front::{FamilyLine, Line, Point, front, within};
 use super::outcome::Outcome;
+use super::pca::Placement;
 use super::{Grid, GridRow, Source};
 
 /// Seconds of rig time over which the fronts are compared.
@@ -19,12 +20,16 @@ pub(crate) struct Against {
     pub(crate) at_s: f64,
 }
 
-/// PCA, which no rig in one plane can run, against the program's own front.
+/// PCA of readings without noise against the program's own front.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Pca {
     pub(crate) readings: usize,
+    /// Where they stand, in words.
+    pub(crate) placed: &'static str,
     pub(crate) male_mean: f64,
     pub(crate) male_median: f64,
+    pub(crate) male_p10: f64,
+    pub(crate) male_p90: f64,
     pub(crate) median_rel: f64,
     /// Seconds of rig time from which the own front lies below it; `None`: nowhere.
     pub(crate) beaten_from_s: Option<f64>,
@@ -39,27 +44,35 @@ pub(crate) struct Summary {
     pub(crate) pca: Vec<Pca>,
     pub(crate) front: Vec<Line>,
     pub(crate) floors: Vec<Line>,
+    /// The plans of the front over the materials of each family.
+    pub(crate) families: Vec<FamilyLine>,
 }
 
 impl Summary {
     pub(crate) fn new(grid: &Grid, outcome: &Outcome<'_>) -> Self {
         let own = outcome.own();
         let mut baselines: Vec<Against> = outcome
-            .families
+            .approaches
             .iter()
-            .filter(|family| !family.own)
-            .filter_map(|family| against(&family.name, &front(&family.points), &own))
+            .filter(|approach| !approach.own)
+            .filter_map(|approach| against(&approach.name, &front(&approach.points), &own))
             .collect();
         if let Some(mut black) = outcome.baseline("black") {
             black.rig_s = 0.0;
             baselines.extend(against("black", &[&black], &own));
         }
-        let pca = grid.pca.iter().filter_map(|&n| {
-            let point = outcome.baseline(&format!("pca-{n}"))?;
+        let placed = Placement::ALL
+            .into_iter()
+            .flat_map(|placement| grid.pca.iter().map(move |&n| (placement, n)));
+        let pca = placed.filter_map(|(placement, n)| {
+            let point = outcome.baseline(&placement.model(n))?;
             Some(Pca {
                 readings: n,
+                placed: placement.words(),
                 male_mean: point.male.mean,
                 male_median: point.male.median,
+                male_p10: point.male.p10,
+                male_p90: point.male.p90,
                 median_rel: point.median_rel.median,
                 beaten_from_s: own
                     .iter()
@@ -78,6 +91,7 @@ impl Summary {
                 .iter()
                 .map(|point| point.line(&point.model))
                 .collect(),
+            families: outcome.by_family(),
         }
     }
 }

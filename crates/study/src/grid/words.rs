@@ -5,17 +5,20 @@ use super::summary::Summary;
 /// What a study found, in words.
 pub(crate) fn words(outcome: &Outcome<'_>, summary: &Summary) -> String {
     let mut text = format!(
-        "{} materials, {} captures on the simulated rig with all its imperfections. Errors are medians over the materials.\n",
-        summary.materials, summary.captures
+        "{} materials of {} families, {} captures on the simulated rig with all its imperfections. Errors are medians over the materials.\n",
+        summary.materials,
+        families(summary),
+        summary.captures
     );
     let own = outcome.own();
     for seconds in [10.0, 20.0, 30.0, 60.0, 120.0, 300.0, 600.0] {
         if let Some(point) = within(&own, seconds) {
             text += &format!(
-                "{seconds:4.0} s: MALE {:.5} (10–90 %: {:.5} … {:.5}), median relative error {:.2} %: {} of {}\n",
+                "{seconds:4.0} s: MALE {:.5} (10–90 %: {:.5} … {:.5}, mean {:.5}), median relative error {:.2} %: {} of {}\n",
                 point.male.median,
                 point.male.p10,
                 point.male.p90,
+                point.male.mean,
                 100.0 * point.median_rel.median,
                 point.model,
                 point.plan()
@@ -50,11 +53,21 @@ pub(crate) fn words(outcome: &Outcome<'_>, summary: &Summary) -> String {
             None => "it is below the front at every time".to_owned(),
         };
         text += &format!(
-            "log-relative PCA of {} readings out of the plane: MALE {:.5}, median relative error {:.2} %; {word}\n",
+            "log-relative PCA of {} readings {}: MALE {:.5} (10–90 %: {:.5} … {:.5}, mean {:.5}), median relative error {:.2} %; {word}\n",
             pca.readings,
+            pca.placed,
             pca.male_median,
+            pca.male_p10,
+            pca.male_p90,
+            pca.male_mean,
             100.0 * pca.median_rel
         );
     }
     text
+}
+
+fn families(summary: &Summary) -> usize {
+    let mut families: Vec<&str> = summary.families.iter().map(|line| line.family.as_str()).collect();
+    families.dedup();
+    families.len()
 }

@@ -100,10 +100,7 @@ mod tests {
 
     #[test]
     fn agrees_with_the_metrics_of_a_run() {
-        let material = Material {
-            name: "alum-bronze".to_owned(),
-            brdf: brdf::specimen("alum-bronze").unwrap(),
-        };
+        let material = Material::new("alum-bronze", brdf::specimen("alum-bronze").unwrap());
         let arc: Vec<f64> = (0..30).map(|i| f64::from(i) * 0.05).collect();
         let deviations: Vec<f64> = (0..60).map(|i| (f64::from(i) / 60.0).powi(3) * 1.9).collect();
         let model = Separable::sample(&material.brdf, 1.2, &deviations, &arc, 0.0).unwrap();

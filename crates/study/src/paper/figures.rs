@@ -21,10 +21,7 @@ pub(crate) fn all(evaluation: &Evaluation, rows: &[Row]) -> Result<Vec<(String, 
             file: "figure 2".to_owned(),
             source,
         })?;
-        let material = Material {
-            name: name.to_owned(),
-            brdf,
-        };
+        let material = Material::new(name, brdf);
         figures.push((format!("figure2-{name}"), slice(evaluation, &material)?));
     }
     figures.push(("figure3-density".to_owned(), density()));
