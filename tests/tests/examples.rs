@@ -156,7 +156,10 @@ fn every_inline_table_of_the_documents_is_taken() {
             let what = order(&format!("fault = {{ device = \"sensor\", what = {table} }}"));
             let silent = rig(&format!("sim.wire.silent = [{table}]"));
             let plane = job(&format!("plane = [{table}]"));
-            assert_taken(&path, table, &[fault, what, silent, plane]);
+            let keys = ["light", "creep", "hunting", "ring", "encoder_error"];
+            let mechanics = keys.map(|key| rig(&format!("sim.{key} = {table}")));
+            let readings = [vec![fault, what, silent, plane], mechanics.into()].concat();
+            assert_taken(&path, table, &readings);
             tables += 1;
         }
     }

@@ -221,7 +221,7 @@ fn reconstruct_makes_the_same_files_again_from_the_journal_alone() {
         }
     }
     let _ = run(GONIOCTL, &root(), &["reconstruct", directory.to_str().unwrap()]).expect(0);
-    assert_eq!(before.len(), 10);
+    assert_eq!(before.len(), 11);
     for (path, mut bytes) in before {
         let mut again = fs::read(&path).unwrap();
         if path.extension().is_some_and(|extension| extension == "exr") {

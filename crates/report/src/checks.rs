@@ -1,4 +1,4 @@
-use capture::Record;
+use capture::{Reading, Record};
 use glam::DVec3;
 use pdv::{Model, Observation};
 use rig::Certificate;
@@ -26,26 +26,41 @@ const REPEAT_LIMIT: f64 = 0.03;
 /// much, before what was measured until then cannot be believed: 6 standard deviations.
 const RESUMED_SIGMAS: f64 = 3.0;
 const RESUMED_LEAST: f64 = 0.01;
+/// Counts of the lamp monitor from which it tells something.
+const MONITORED: u32 = 100;
 /// The two sides of a lobe may differ by so much: beyond it the assumption of the model costs more than the rig does.
 const SIDES_LIMIT: f64 = 0.10;
 
 /// Whether what a run measured before it was interrupted still holds: one of its poses is measured again when it goes on. `None`
 /// where it never was interrupted. What changed meanwhile, or was wrong just before, shows in nothing else.
 pub(crate) fn resumed(measurements: &[Measurement], records: &[Record]) -> Option<Check> {
-    let u_of = |step: usize| {
-        let of_step = measurements
+    // Each channel by itself: light from outside shows most in the faintest.
+    let differs = |again: &Reading| {
+        let before = measurements
             .iter()
-            .filter(|m| m.reading.step == step && m.reading.accepted);
-        let relative = of_step.filter_map(|m| Some((m.u? / m.rgb()?.abs()).max_element()));
-        relative.fold(0.0, f64::max)
+            .filter(|m| m.reading.step == again.step && m.reading.accepted);
+        before
+            .filter_map(|m| Some((m, m.u? / m.rgb()?.abs())))
+            .any(|(m, u)| {
+                // Where nothing is on the monitor's port it tells nothing of the lamp.
+                let monitored = again.counts.monitor.min(m.reading.counts.monitor) >= MONITORED;
+                let level = |reading: &Reading, c: usize| {
+                    let lamp = if monitored { reading.counts.monitor } else { 1 };
+                    f64::from(reading.counts.rgb[c]) / f64::from(lamp)
+                };
+                (0..3).any(|c| {
+                    let difference = level(again, c) / level(&m.reading, c).max(f64::MIN_POSITIVE) - 1.0;
+                    difference.abs() > (RESUMED_SIGMAS * u[c]).max(RESUMED_LEAST)
+                })
+            })
     };
-    let repeats: Vec<(f64, f64)> = records
+    let repeats: Vec<(f64, bool)> = records
         .iter()
         .filter_map(|record| match record {
             Record::Repeat {
                 reading,
                 difference_rel,
-            } if reading.lamp => Some((*difference_rel, u_of(reading.step))),
+            } if reading.lamp => Some((*difference_rel, differs(reading))),
             _ => None,
         })
         .collect();
@@ -53,10 +68,7 @@ pub(crate) fn resumed(measurements: &[Measurement], records: &[Record]) -> Optio
         .iter()
         .map(|(difference, _)| difference.abs())
         .reduce(f64::max)?;
-    let bad = repeats
-        .iter()
-        .filter(|(difference, u)| difference.abs() > (RESUMED_SIGMAS * u).max(RESUMED_LEAST))
-        .count();
+    let bad = repeats.iter().filter(|(_, differs)| *differs).count();
     let (verdict, text) = match (bad, limit(worst, REPEAT_LIMIT)) {
         (0, Verdict::Good) => (
             Verdict::Good,

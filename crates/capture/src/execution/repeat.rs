@@ -4,13 +4,24 @@ use sweep::Sweep;
 use super::{Execution, Interrupt, readings};
 use crate::{Event, Flag, Reading, Record};
 
+/// Among so many of the latest readings the faintest is measured again.
+const LATEST: usize = 8;
+
 impl<R: Rig> Execution<'_, R> {
-    /// Measures a pose of the finished part again and records by how much it differs.
+    /// Measures poses of the finished part again and records by how much they differ: the last one, and the faintest of
+    /// the last ones, where light from outside shows most.
     pub(super) async fn repeat(&mut self) -> Result<(), Interrupt<R::Error>> {
-        let Some(before) = reference(self.journal.records()).cloned() else {
-            return Ok(());
-        };
-        self.switch_lamp(true).await?;
+        let references: Vec<Reading> = references(self.journal.records()).cloned().collect();
+        if !references.is_empty() {
+            self.switch_lamp(true).await?;
+        }
+        for before in references {
+            self.repeat_one(&before).await?;
+        }
+        Ok(())
+    }
+
+    async fn repeat_one(&mut self, before: &Reading) -> Result<(), Interrupt<R::Error>> {
         let retries = self.drive.retries();
         // In flight a reading is not taken at its step's pose itself.
         let taken = self.file.nearest(before.measured);
@@ -47,13 +58,27 @@ impl<R: Rig> Execution<'_, R> {
     }
 }
 
-/// The reading that is measured again when a run goes on: the last one that is bright enough and not too bright.
-fn reference(records: &[Record]) -> Option<&Reading> {
+/// The readings that are measured again when a run goes on, of those that are bright enough and not too bright.
+fn references(records: &[Record]) -> impl Iterator<Item = &Reading> {
     let sound = |reading: &&Reading| {
         let poor = [Flag::Saturated, Flag::Dim];
         reading.accepted && reading.lamp && !reading.flags.iter().any(|flag| poor.contains(flag))
     };
-    readings(records).filter(sound).last()
+    let latest: Vec<&Reading> = readings(records).filter(sound).collect();
+    let latest = &latest[latest.len().saturating_sub(LATEST)..];
+    let last = latest.last().copied();
+    let faintest = latest
+        .iter()
+        .copied()
+        .min_by(|a, b| level(&a.counts).total_cmp(&level(&b.counts)));
+    let faintest = faintest.filter(|faintest| last.is_some_and(|last| last.step != faintest.step));
+    last.into_iter().chain(faintest)
+}
+
+/// Counts of the brightest channel by µs at gain ×1.
+fn level(counts: &Counts) -> f64 {
+    let brightest = f64::from(counts.rgb.into_iter().fold(0, u32::max));
+    brightest / (f64::from(counts.exposure.integration_us) * counts.exposure.gain.factor())
 }
 
 /// Relative difference of the channel that was brightest, each relative to the lamp monitor.
