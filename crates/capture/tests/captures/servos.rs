@@ -2,7 +2,9 @@
 
 use std::fmt::Write as _;
 
+use arms::Pose;
 use capture::{Flag, Outcome};
+use rig::RigFile;
 
 use crate::bench::{SHORT, Scene};
 
@@ -78,4 +80,28 @@ async fn every_job_ends_complete_whatever_servos_do_in_about_the_time_that_was_p
     }
     println!("{report}");
     assert!(bad.is_empty(), "{bad:?}\n{report}");
+}
+
+/// An arm that does not arrive is told with what its motion looks like, and what to change.
+#[tokio::test(start_paused = true)]
+async fn what_keeps_an_arm_from_its_goal_is_named() {
+    let cases = [
+        ("stiction", "[motion]\nnear_deg = 0.1\n[sim]\nstiction_counts = 4"),
+        ("to and fro", "[sim]\nhunting = { counts = 14, hz = 10 }"),
+        ("to and fro", "[sim]\nhunting = { counts = 14, hz = 5 }"),
+        ("creeps", "[sim]\ncreep = { counts = 60, counts_per_s = 5 }"),
+        (
+            "blocks it",
+            "[sim]\nfault = [{ device = \"light\", at_s = 0.1, what = { stall_s = 60.0 } }]",
+        ),
+    ];
+    for (word, text) in cases {
+        let file = RigFile::parse(text, "test.toml".as_ref()).expect("a good rig file");
+        let mut drive = Scene::on(file, SHORT).await.drive;
+        drive.engage_all().await.expect("the servos are well");
+        // Far from the limits and from the other arm there is room to send an arm on.
+        let fault = drive.travel(&[Pose::from_deg(-30.0, 40.0)]).await;
+        let fault = fault.expect_err(text).to_string();
+        assert!(fault.contains(word), "{text}: {fault}");
+    }
 }

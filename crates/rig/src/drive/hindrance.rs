@@ -26,8 +26,8 @@ impl fmt::Display for Hindrance {
                  motion.near_deg"
             }
             Self::Load => {
-                "it gives way under a load such as gravity: balance the arm, raise the servo's Position P Gain (84), or \
-                 motion.near_deg"
+                "it gives way under a load such as gravity, or friction holds it: balance the arm, raise the servo's Position \
+                 P Gain (84), or motion.near_deg"
             }
             Self::Hunting => {
                 "it goes to and fro, as an integral gain on friction makes it: lower the servo's Position I Gain (82), or \

@@ -26,6 +26,8 @@ const IGNORED: f64 = 0.25;
 /// times what is near enough.
 const HUNT: Duration = Duration::from_millis(200);
 const HUNTING: f64 = 2.0;
+/// Over this time an arm that never came to rest shows whether it went anywhere: whole periods of a slow hunt in each half.
+const TREND: Duration = Duration::from_millis(800);
 /// An arm that is near at the first look is looked at this much sooner the next time.
 const SOONER: f64 = 0.7;
 /// How much more than last time an arm may tremble without being waited for.
@@ -291,7 +293,8 @@ impl<R: Rig> Drive<R> {
                 let recent = looks.over(HUNT).unwrap_or_else(|| looks.all());
                 let arm = self.away(recent.pose, goal).or(recent.moved(self.still_rad()));
                 let arm = arm.unwrap_or(Arm::Light);
-                let hindrance = self.hindrance(arm, recent, looks.drift_rad(HUNT), goal);
+                let drift_rad = looks.drift_rad(TREND).or(looks.drift_rad(HUNT));
+                let hindrance = self.hindrance(arm, recent, drift_rad, goal);
                 return Err(self.not_arrived(arm, goal, recent.pose, watch, hindrance));
             }
             self.wait(poll).await?;
