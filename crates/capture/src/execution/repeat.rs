@@ -2,6 +2,7 @@ use rig::{Counts, Rig};
 use sweep::Sweep;
 
 use super::{Execution, Interrupt, readings};
+use crate::exposure::sensitivity;
 use crate::{Event, Flag, Reading, Record};
 
 /// Among so many of the latest readings the faintest is measured again.
@@ -77,8 +78,7 @@ fn references(records: &[Record]) -> impl Iterator<Item = &Reading> {
 
 /// Counts of the brightest channel by µs at gain ×1.
 fn level(counts: &Counts) -> f64 {
-    let brightest = f64::from(counts.rgb.into_iter().fold(0, u32::max));
-    brightest / (f64::from(counts.exposure.integration_us) * counts.exposure.gain.factor())
+    f64::from(counts.rgb.into_iter().fold(0, u32::max)) / sensitivity(counts.exposure)
 }
 
 /// Relative difference of the channel that was brightest, each relative to the lamp monitor.

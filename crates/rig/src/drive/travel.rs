@@ -65,6 +65,12 @@ impl<R: Rig> Drive<R> {
         self.leg(last, self.file.motion.settle).await
     }
 
+    /// Where the arms stood over the last stretch of time; `None` where one moved, or nobody looked for so long.
+    fn still(&self, looks: &Looks, window: Duration) -> Option<Rest> {
+        let rest = looks.over(window)?;
+        rest.moved(self.still_rad()).is_none().then_some(rest)
+    }
+
     /// Where the arms are, by one look.
     async fn look_at_rest(&mut self) -> Result<Rest, DriveError<R::Error>> {
         let mut looks = Looks::default();
@@ -141,10 +147,7 @@ impl<R: Rig> Drive<R> {
         loop {
             let elapsed = watch.elapsed(self.waited);
             looks.push(elapsed, self.snapshot().await?.pose());
-            let still = looks
-                .over(SWING)
-                .filter(|rest| rest.moved(self.still_rad()).is_none());
-            match still {
+            match self.still(&looks, SWING) {
                 Some(rest) => return Ok(rest),
                 None if elapsed > self.file.motion.timeout => return Ok(looks.all()),
                 None => self.wait(POLL * LOOKS).await?,
@@ -255,20 +258,13 @@ impl<R: Rig> Drive<R> {
                 return Ok(looks.all());
             }
             // Without a settling time one look is enough, which was not near.
-            let rest = looks.over(if settle.is_zero() { window } else { settle });
-            let still = rest.filter(|rest| rest.moved(self.still_rad()).is_none());
-            if let Some(rest) = still {
-                let off = Arm::BOTH.map(|arm| self.off(arm, rest.pose, goal));
-                let worst = off[0].max(off[1]);
-                if worst <= near_rad {
-                    self.arrived(rest, late.unwrap_or(over), aim);
-                    return Ok(rest);
-                }
+            let still = self.still(&looks, if settle.is_zero() { window } else { settle });
+            if let Some(rest) = still.filter(|rest| self.away(rest.pose, goal).is_none()) {
+                self.arrived(rest, late.unwrap_or(over), aim);
+                return Ok(rest);
             }
             // What swings looks still where it turns back; it is not sent on.
-            let stands = looks
-                .over(SWING)
-                .filter(|rest| rest.moved(self.still_rad()).is_none());
+            let stands = self.still(&looks, SWING);
             if let Some(rest) = stands
                 && over > self.latest()
             {
