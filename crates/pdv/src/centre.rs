@@ -1,3 +1,5 @@
+use brdf::Brdf;
+use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 
 /// Lobes that are wider than this say less of where their peak stands than the change of the reflectance with the
@@ -28,7 +30,7 @@ const HEIGHT_SLOPE: f64 = 4.0;
 /// Share of its half width by which a lobe that is not quite even may stand elsewhere: standard deviation.
 const LOPSIDED: f64 = 0.03;
 /// Points of a curve that miss a shape independently of each other.
-const ALONE: f64 = 6.0;
+const ALONE: f64 = 4.0;
 /// How far off a lobe is believed to stand, and how unsure that may be, rad: 1.5° and 0.15°.
 const FARTHEST_RAD: f64 = 0.026;
 const UNSURE_RAD: f64 = 0.0026;
@@ -61,6 +63,43 @@ pub struct Centre {
     pub u_rad: f64,
 }
 
+/// What curves say together: where the lobe of each stands, and what lobe it is.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Centres {
+    /// Of each curve; `None` where it does not tell.
+    pub curves: Vec<Option<Centre>>,
+    /// The lobe, where it is narrow enough to tell anything.
+    pub lobe: Option<NarrowLobe>,
+}
+
+/// A lobe that is narrow enough to tell where it stands, on an even ground: a grey BRDF of the half angle θ_h and the
+/// difference angle θ_d, exp(height(θ_d))·(1 + (θ_h/a)²)^−b + ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct NarrowLobe {
+    /// a, rad.
+    pub width_rad: f64,
+    /// b.
+    pub steepness: f64,
+    /// ln of the ground in sr⁻¹.
+    ground: f64,
+    /// Coefficients of the height by powers of θ_d − π/4.
+    heights: [f64; HEIGHTS],
+}
+
+impl Brdf for NarrowLobe {
+    fn eval(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
+        let sum = incident + exitant;
+        let half = sum.truncate().length().atan2(sum.z);
+        // |ω_i − ω_o| = 2 sin θ_d and |ω_i + ω_o| = 2 cos θ_d.
+        let difference = incident.distance(exitant).atan2(sum.length()) - std::f64::consts::FRAC_PI_4;
+        let height: f64 = (0..HEIGHTS)
+            .map(|power| self.heights[power] * difference.powi(power as i32))
+            .sum();
+        let fall = (half / self.width_rad).powi(2).ln_1p();
+        DVec3::splat((height - self.steepness * fall).exp() + self.ground.exp())
+    }
+}
+
 /// Where the lobe of each curve stands, told by all curves together.
 ///
 /// By isotropy and reciprocity f in the plane is even in the signed half angle, so that what is off in the angles of a
@@ -84,33 +123,39 @@ pub struct Centre {
 ///         Crossing { half_rad: half, difference_rad: 0.5 - half, f, u: 0.0 }
 ///     })
 ///     .collect();
-/// let centre = centres(&[curve])[0].expect("a sharp lobe");
+/// let centre = centres(&[curve]).curves[0].expect("a sharp lobe");
 /// assert!((centre.half_rad.to_degrees() - 0.1).abs() < 0.01);
 /// ```
-pub fn centres(curves: &[Vec<Crossing>]) -> Vec<Option<Centre>> {
-    let mut found = vec![None; curves.len()];
-    let lobes: Vec<(usize, Vec<Point>)> = curves
+pub fn centres(curves: &[Vec<Crossing>]) -> Centres {
+    let mut found = Centres {
+        curves: vec![None; curves.len()],
+        lobe: None,
+    };
+    let all: Vec<(usize, Vec<Point>)> = curves
         .iter()
+        .map(|curve| lobe(curve))
         .enumerate()
-        .filter_map(|(curve, points)| Some((curve, lobe(points)?)))
+        .filter(|(_, points)| !points.is_empty())
         .collect();
-    let points: Vec<Point> = lobes
+    let telling: Vec<&(usize, Vec<Point>)> = all
+        .iter()
+        .filter(|(curve, points)| points.len() >= FEWEST && crosses(&curves[*curve]))
+        .collect();
+    let points: Vec<Point> = telling
         .iter()
         .enumerate()
         .flat_map(|(place, (_, points))| points.iter().map(move |point| Point { place, ..*point }))
         .collect();
-    let fit = BEGIN_RAD
-        .iter()
-        .filter_map(|&begin| Fit::new(&points, lobes.len(), begin))
-        .min_by(|a, b| a.cost.total_cmp(&b.cost));
-    let Some(fit) = fit else { return found };
-    let lobe_is_narrow = (0.0..=WIDEST_RAD).contains(&fit.width_rad());
-    if !lobe_is_narrow {
+    if let Some(fit) = Fit::best(&points, telling.len()) {
+        for (place, (curve, _)) in telling.iter().enumerate() {
+            found.curves[*curve] = fit.centre(place);
+        }
+        found.lobe = Some(fit.lobe());
         return found;
     }
-    for (place, (curve, _)) in lobes.iter().enumerate() {
-        found[*curve] = fit.centre(place);
-    }
+    // Where too few readings fell into the lobe for that, all of them together may still tell what lobe it is.
+    let points: Vec<Point> = all.into_iter().flat_map(|(_, points)| points).collect();
+    found.lobe = Fit::best(&points, 1).map(|fit| fit.lobe());
     found
 }
 
@@ -126,18 +171,18 @@ struct Point {
     weight: f64,
 }
 
-/// What of a curve belongs to its lobe; `None` where that is too little to tell where it stands.
-fn lobe(curve: &[Crossing]) -> Option<Vec<Point>> {
+/// What of a curve belongs to its lobe.
+fn lobe(curve: &[Crossing]) -> Vec<Point> {
     let near = |point: &&Crossing| point.half_rad.abs() <= NEAR_RAD && point.f > 0.0;
     let peak = curve
         .iter()
         .filter(near)
         .map(|point| point.f.ln())
-        .max_by(f64::total_cmp)?;
+        .fold(f64::NEG_INFINITY, f64::max);
     let belongs = |point: &&Crossing| {
         point.f > 0.0 && point.half_rad.abs() <= FAR_RAD && (point.f.ln() - peak).abs() <= DEPTH
     };
-    let points: Vec<Point> = curve
+    curve
         .iter()
         .filter(belongs)
         .map(|point| Point {
@@ -147,9 +192,13 @@ fn lobe(curve: &[Crossing]) -> Option<Vec<Point>> {
             ln_f: point.f.ln(),
             weight: (point.u / point.f).hypot(LEAST_U).recip(),
         })
-        .collect();
+        .collect()
+}
+
+/// Whether a curve reaches far enough to both sides of the mirror direction.
+fn crosses(curve: &[Crossing]) -> bool {
     let reaches = |side: f64| curve.iter().any(|point| point.half_rad * side >= REACH_RAD);
-    (points.len() >= FEWEST && reaches(1.0) && reaches(-1.0)).then_some(points)
+    reaches(1.0) && reaches(-1.0)
 }
 
 /// The lobe that fits all points best, and how well. Parameters: a shift for each curve, ln a, ln b, ln of the ground, the
@@ -162,6 +211,15 @@ struct Fit {
 }
 
 impl Fit {
+    /// The best of several beginnings; `None` where the lobe is too wide, or has too few points.
+    fn best(points: &[Point], curves: usize) -> Option<Self> {
+        let fits = BEGIN_RAD
+            .iter()
+            .filter_map(|&begin| Self::new(points, curves, begin));
+        let best = fits.min_by(|a, b| a.cost.total_cmp(&b.cost))?;
+        (0.0..=WIDEST_RAD).contains(&best.width_rad()).then_some(best)
+    }
+
     fn new(points: &[Point], curves: usize, width_rad: f64) -> Option<Self> {
         let parameters = curves + HEIGHT + HEIGHTS;
         if curves == 0 || points.len() <= parameters {
@@ -169,9 +227,15 @@ impl Fit {
         }
         let mut at = DVector::zeros(parameters);
         at[curves] = width_rad.ln();
-        let lowest = points.iter().map(|point| point.ln_f).fold(f64::INFINITY, f64::min);
+        let lowest = points
+            .iter()
+            .map(|point| point.ln_f)
+            .fold(f64::INFINITY, f64::min);
         at[curves + GROUND] = lowest - 1.0;
-        at[curves + HEIGHT] = points.iter().map(|point| point.ln_f).fold(f64::NEG_INFINITY, f64::max);
+        at[curves + HEIGHT] = points
+            .iter()
+            .map(|point| point.ln_f)
+            .fold(f64::NEG_INFINITY, f64::max);
         let mut normal = Normal::new(points, curves, &at);
         let mut damping = 1e-3;
         for _ in 0..STEPS {
@@ -210,10 +274,22 @@ impl Fit {
         self.parameters[self.curves].exp()
     }
 
+    fn lobe(&self) -> NarrowLobe {
+        let of = |place: usize| self.parameters[self.curves + place];
+        NarrowLobe {
+            width_rad: self.width_rad(),
+            steepness: of(1).exp(),
+            ground: of(GROUND),
+            heights: std::array::from_fn(|power| of(HEIGHT + power)),
+        }
+    }
+
     fn centre(&self, curve: usize) -> Option<Centre> {
         let centre = Centre {
             half_rad: self.parameters[curve],
-            u_rad: self.covariance[(curve, curve)].sqrt().hypot(LOPSIDED * self.width_rad()),
+            u_rad: self.covariance[(curve, curve)]
+                .sqrt()
+                .hypot(LOPSIDED * self.width_rad()),
         };
         let told = centre.half_rad.abs() <= FARTHEST_RAD && centre.u_rad <= UNSURE_RAD;
         told.then_some(centre)
@@ -240,7 +316,10 @@ impl Normal {
             squares: 0.0,
         };
         let (a, b, ground) = (at[curves].exp(), at[curves + 1].exp(), at[curves + GROUND]);
-        let lowest = points.iter().map(|point| point.ln_f).fold(f64::INFINITY, f64::min);
+        let lowest = points
+            .iter()
+            .map(|point| point.ln_f)
+            .fold(f64::INFINITY, f64::min);
         let mut slopes = DVector::zeros(n);
         for point in points {
             let x = (point.half - at[point.place]) / a;
@@ -338,7 +417,7 @@ mod tests {
         for readings in [14, 40] {
             let (mut told, mut within, mut worst) = (0, 0, 0.0_f64);
             for (name, material) in Fitted::all() {
-                let found = centres(&read(&material, readings, shifts));
+                let found = centres(&read(&material, readings, shifts)).curves;
                 for (centre, shift) in found.into_iter().zip(shifts) {
                     let Some(centre) = centre else { continue };
                     let off_deg = centre.half_rad.to_degrees() - shift;
@@ -374,8 +453,8 @@ mod tests {
                 u: 0.0,
             })
             .collect();
-        assert_eq!(centres(&[flat]), [None]);
-        assert_eq!(centres(&[one_sided, Vec::new()]), [None, None]);
-        assert_eq!(centres(&[]), []);
+        for curves in [vec![flat], vec![one_sided, Vec::new()], Vec::new()] {
+            assert_eq!(centres(&curves).curves, vec![None; curves.len()]);
+        }
     }
 }

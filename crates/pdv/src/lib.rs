@@ -67,7 +67,7 @@ pub use albedo::albedo;
 pub use alternatives::Alternatives;
 pub use auto::Auto;
 pub use bivariate::Bivariate;
-pub use centre::{Centre, Crossing, centres};
+pub use centre::{Centre, Centres, Crossing, NarrowLobe, centres};
 pub use compare::{Comparison, Draw, compare, compare_within};
 pub use coordinates::{Pdv, light_angle};
 pub use density::{Density, mean_reflectance};

@@ -6,12 +6,14 @@ use serde_json::json;
 
 use crate::{Check, Measurement, Readings, Run, Verdict};
 
+mod angles;
 mod coverage;
 mod darkness;
 mod energy;
 mod reflectance;
 mod visits;
 
+pub(crate) use angles::angles;
 pub(crate) use coverage::coverage;
 pub(crate) use darkness::darkness;
 pub(crate) use energy::energy;

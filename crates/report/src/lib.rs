@@ -4,6 +4,7 @@
 //! with [`reconstruct`]. The crate knows nothing of buses, of motion, or of how a run came about.
 
 mod adapt;
+mod alignment;
 mod check;
 mod checks;
 mod derive;

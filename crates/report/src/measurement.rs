@@ -1,5 +1,6 @@
 use std::collections::HashMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use arms::Pose;
 use capture::{Reading, Record, extended_plan};
@@ -8,17 +9,22 @@ use pdv::{Observation, Pdv};
 use rig::{Budget, Certificate, Reduction, RigFile, Taken, Unusable};
 use sweep::Sweep;
 
+use crate::alignment::{Alignment, leans};
 use crate::run::TICK_S;
 use crate::sensitivity::Sensitivity;
-use crate::uncertainty::{COVERAGE, expand};
+use crate::uncertainty::{COVERAGE, expand, zeros};
 
 /// A reading with what follows from it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Measurement {
     /// The reading, raw.
     pub reading: Reading,
-    /// Where the arms really were, by what was measured and the certificate's alignment.
+    /// Where the arms were at the specimen, by what was measured, the certificate and the alignment.
     pub pose: Pose,
+    /// Which way each arm leant against its encoder, −1 … 1: +1 where it had moved towards larger angles.
+    pub(crate) lean: [f64; 2],
+    /// What the run's own lobes say of its angles.
+    pub(crate) alignment: Arc<Alignment>,
     /// Whether the arms may have shadowed each other there, within the integration and as far as the zeros are known.
     /// Plans keep clear of it.
     pub shadowed: bool,
@@ -77,16 +83,23 @@ pub fn measurements(records: &[Record], rig: &RigFile) -> Vec<Measurement> {
     let visits: Vec<Taken> = visits.map(|(_, taken)| *taken).collect();
     let reduction = Reduction::new(rig, certificate(records), &believed, &visits);
     let stays = stays(records);
-    let measure = |(i, (reading, taken)): (usize, &(&Reading, Taken))| {
+    let leans = leans(
+        &readings.iter().map(|(reading, _)| *reading).collect::<Vec<_>>(),
+        rig,
+    );
+    let measure = |alignment: &Arc<Alignment>, i: usize| {
+        let (reading, taken) = readings[i];
         let exposures = match reading.accepted {
             true => &all[together(&stays, i)],
-            false => std::slice::from_ref(taken),
+            false => std::slice::from_ref(&all[i]),
         };
-        let reflectance = reading.lamp.then(|| reduction.combined(exposures));
+        let pose = alignment.aligned(reduction.aligned(reading.measured), reading.sweep, leans[i]);
+        let reflectance = reading.lamp.then(|| reduction.combined_at(pose, exposures));
         let good = reflectance.and_then(Result::ok);
-        let pose = reduction.aligned(reading.measured);
         Measurement {
             pose,
+            lean: leans[i],
+            alignment: alignment.clone(),
             shadowed: rig.shadowed(pose, reading.swept_rad.unwrap_or_default()),
             theta_r: pose.sensor.rad().abs(),
             deviation: pose.deviation() * 1_f64.copysign(pose.sensor.rad()),
@@ -97,12 +110,18 @@ pub fn measurements(records: &[Record], rig: &RigFile) -> Vec<Measurement> {
             u: None,
             sensitivity: Sensitivity::default(),
             time_s: taken.time_s,
-            reading: (*reading).clone(),
+            reading: reading.clone(),
         }
     };
-    let mut measurements: Vec<Measurement> = readings.iter().enumerate().map(measure).collect();
+    let with = |alignment: Alignment| -> Vec<Measurement> {
+        let alignment = Arc::new(alignment);
+        (0..readings.len()).map(|i| measure(&alignment, i)).collect()
+    };
+    let zeros = zeros(records, rig);
+    let by_certificate = with(Alignment::none());
+    let mut measurements = with(Alignment::new(&by_certificate, rig, zeros));
     sharpen(&mut measurements, records);
-    expand(&mut measurements, records, rig);
+    expand(&mut measurements, zeros, rig);
     measurements
 }
 

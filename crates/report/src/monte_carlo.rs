@@ -9,7 +9,7 @@ use sweep::{Job, Sweep};
 use crate::Measurement;
 use crate::derive::Sweeps;
 use crate::measurement::{observation, visits};
-use crate::uncertainty::{COVERAGE, zeros};
+use crate::uncertainty::{COVERAGE, angle_rad, zeros};
 
 /// Draws: the standard deviation over them is known to 13 %.
 const DRAWS: usize = 32;
@@ -23,7 +23,7 @@ const SEED: u64 = 0x676f_6e69_6f64;
 /// The reconstruction made again of readings that differ from the measured ones as they may be wrong: what a result's
 /// spread over these models is, is its uncertainty.
 ///
-/// Errors are drawn in ln f, so that no draw is negative, and what is common to readings stays common: responsivity, linearity, each gain step, colour mixing, stray light and the sum
+/// Errors are drawn in ln f, so that no draw is negative, and what is common to readings stays common: responsivity, linearity, each gain step, colour mixing, stray light, the alignment
 /// and the difference of the arms' zeros are drawn once a draw, the lamp and the dark level once for each sweep; counting noise and an arm's angle in each reading for themselves.
 pub struct MonteCarlo {
     models: Vec<Box<dyn Model>>,
@@ -33,15 +33,19 @@ impl MonteCarlo {
     /// Draws of a job's measurements. Empty where no model can be made of them.
     pub fn new(job: &Job, measurements: &[Measurement], records: &[capture::Record], rig: &RigFile) -> Self {
         let mut random = ChaCha8Rng::seed_from_u64(SEED);
-        let angle = rig.uncertainty.angle_rad;
         let zeros = zeros(records, rig);
+        let alignment = measurements.first().map(|m| m.alignment.as_ref());
         let draw = |_| {
             let common = Common::draw(&mut random, zeros);
+            let turned = alignment.map(|alignment| alignment.draw(&mut random));
             let mut sweep = |sweep: Sweep| -> Vec<Observation> {
                 let of_sweep: [DVec3; 2] = [normal3(&mut random), normal3(&mut random)];
                 let mut draw = |visit: &Vec<usize>| {
                     observation(measurements, visit, |m| {
-                        drawn(m, common.error(m, of_sweep, angle, &mut random)?)
+                        let off = turned
+                            .as_ref()
+                            .map_or([0.0; 2], |turned| turned.of(sweep, m.lean));
+                        drawn(m, common.error(m, of_sweep, off, angle_rad(m, rig), &mut random)?)
                     })
                 };
                 visits(measurements, sweep).iter().filter_map(&mut draw).collect()
@@ -104,14 +108,13 @@ struct Common {
     colour: DVec3,
     stray: f64,
     aperture: f64,
-    /// Rad.
-    zeros: [f64; 2],
+    bend: f64,
+    /// Half the difference of the arms' zeros, rad.
+    apart: f64,
 }
 
 impl Common {
     fn draw(random: &mut ChaCha8Rng, zeros: ZeroUncertainty) -> Self {
-        let half_sum = zeros.half_sum_rad * normal(random);
-        let half_difference = zeros.half_difference_rad * normal(random);
         Self {
             // A reference is as wrong in one colour as in the others, more or less.
             reference: DVec3::splat(normal(random)),
@@ -120,7 +123,8 @@ impl Common {
             colour: normal3(random),
             stray: normal(random),
             aperture: normal(random),
-            zeros: [half_sum + half_difference, half_sum - half_difference],
+            bend: normal(random),
+            apart: zeros.half_difference_rad * normal(random),
         }
     }
 
@@ -129,7 +133,8 @@ impl Common {
         &self,
         m: &Measurement,
         [dark, drift]: [DVec3; 2],
-        angle: f64,
+        [off_light, off_sensor]: [f64; 2],
+        angle: [f64; 2],
         random: &mut ChaCha8Rng,
     ) -> Option<DVec3> {
         let budget = m.budget?;
@@ -143,7 +148,8 @@ impl Common {
         // A channel takes from the other colours where they are brighter, and gives where they are darker.
         let raw = m.raw?;
         let others = (DVec3::splat(raw.element_sum()) - 3.0 * raw).signum();
-        let [light, sensor] = self.zeros.map(|zero| zero + angle * normal(random));
+        let light = off_light + self.apart + angle[0] * normal(random);
+        let sensor = off_sensor - self.apart + angle[1] * normal(random);
         Some(
             u(budget.counting) * normal3(random)
                 + u(budget.dark) * dark
@@ -155,6 +161,7 @@ impl Common {
                 + u(budget.stray) * self.stray
                 + m.sensitivity.arms[0] * light
                 + m.sensitivity.arms[1] * sensor
+                + m.sensitivity.bend * self.bend
                 + m.sensitivity.aperture * self.aperture,
         )
     }

@@ -251,6 +251,7 @@ fn inputs(measurements: &[Measurement], records: &[Record], rig: &RigFile) -> Ve
     std::iter::once(darkness)
         .chain(calibration)
         .chain(visits)
+        .chain(checks::angles(measurements))
         .chain(checks::resumed(measurements, records))
         .collect()
 }

@@ -125,8 +125,15 @@ pub struct Uncertainties {
     pub crosstalk: f64,
     /// Of the stray light, as f·cos in sr⁻¹, where no black trap was measured.
     pub stray_per_sr: f64,
-    /// Of an arm's angle at each reading, rad.
-    pub angle_rad: f64,
+    /// Of each arm's angle from one reading to the next, rad.
+    pub angle_rad: [f64; 2],
+    /// Play between each arm and its encoder, rad of the arm; half of it, by which an arm lags behind its encoder, is known
+    /// to a half.
+    pub play_rad: [f64; 2],
+    /// By how much an encoder errs where an arm stands for a sweep, rad.
+    pub encoder_rad: f64,
+    /// Of how a specimen lies, in the plane of the arms, rad.
+    pub tilt_rad: f64,
     /// Of an arm's zero, rad, where no mirror was measured.
     pub zero_rad: f64,
     /// Half angles of source and detector as the specimen sees them, rad.
@@ -135,9 +142,12 @@ pub struct Uncertainties {
 
 impl Uncertainties {
     /// How much further apart than the separation the arms must be while they are read, rad: twice the standard
-    /// uncertainty of the angle between them. A mirror does not lower it, since it tells the sum of the zeros alone.
+    /// uncertainty of the angle between them, and half the play of both, by which they may lean towards each other. A mirror
+    /// does not lower it, since it tells the sum of the zeros alone.
     pub fn shadow_margin_rad(&self) -> f64 {
-        2.0 * std::f64::consts::SQRT_2 * self.zero_rad.hypot(self.angle_rad)
+        let arm = |angle_rad: f64| self.zero_rad.hypot(angle_rad).hypot(self.encoder_rad);
+        let [light, sensor] = self.angle_rad.map(arm);
+        2.0 * light.hypot(sensor) + self.play_rad.iter().sum::<f64>() / 2.0
     }
 }
 

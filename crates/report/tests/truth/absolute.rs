@@ -14,7 +14,8 @@ use crate::bench::Laboratory;
 const JOB: &str = "[reconstruction]\nmodel = \"separable\"\n[[plane]]\ntheta_r_deg = 45\nreadings = 60\ndistribution = \"uniform\"\n[arc]\nreadings = 40";
 const ALBEDO: f64 = 0.5;
 /// Time enough to collect light rather than amplify it: 0.02 % of noise at ×1, where ×256 has 0.28 %.
-const PATIENT: &str = "[photometer]\nintegration_max_us = 10000000\n[calibration]\nmonitor = 0.08\n";
+const PATIENT: &str = "[photometer]\nintegration_max_us = 10000000\n[uncertainty]\nplay_deg = 0.02\n\
+                       [calibration]\nmonitor = 0.08\n";
 
 /// A white reference that is none too white and no Lambertian, like sintered PTFE: darker the further both directions
 /// are from the normal.

@@ -60,12 +60,30 @@ impl Laboratory {
             .await
     }
 
+    /// How a job on a specimen ends, and its records, complete or not.
+    pub(crate) async fn attempt(&self, specimen: Arc<dyn Brdf>, job: &str) -> (Outcome, Vec<Record>) {
+        let parsed = Job::parse(job, "job.toml").expect("a good job");
+        self.execute(specimen, job, |mechanics| sweep::plan(&parsed, mechanics))
+            .await
+    }
+
     async fn run(
         &self,
         specimen: Arc<dyn Brdf>,
         job: &str,
         plan: impl FnOnce(&sweep::Mechanics) -> Result<Plan, sweep::SweepError>,
     ) -> Vec<Record> {
+        let (outcome, records) = self.execute(specimen, job, plan).await;
+        assert_eq!(outcome, Outcome::Done);
+        records
+    }
+
+    async fn execute(
+        &self,
+        specimen: Arc<dyn Brdf>,
+        job: &str,
+        plan: impl FnOnce(&sweep::Mechanics) -> Result<Plan, sweep::SweepError>,
+    ) -> (Outcome, Vec<Record>) {
         let bench = Bench::with_specimen(&self.file, specimen).expect("a good [sim] table");
         let mut rig = InProcessRig::over(bench, &self.file);
         let start = rig.snapshot().await.expect("all devices answer").pose();
@@ -82,7 +100,6 @@ impl Laboratory {
         let (_operator, control) = watch::channel(Command::Run);
         let mut drive = Drive::new(rig, self.file.clone());
         let outcome = capture::run(&mut drive, &mut journal, control, &mut |_| ()).await;
-        assert_eq!(outcome.expect("the journal is sound"), Outcome::Done);
-        journal.0
+        (outcome.expect("the journal is sound"), journal.0)
     }
 }

@@ -22,7 +22,7 @@ async fn readings(specimen: &str, mirror: bool) -> (f64, f64) {
         let mut random = ChaCha8Rng::seed_from_u64(seed);
         let mut zero = || -> f64 { ZERO_DEG * Distribution::<f64>::sample(&StandardNormal, &mut random) };
         let mut laboratory = Laboratory::new(&format!(
-            "[uncertainty]\nzero_deg = {ZERO_DEG}\nangle_deg = 0.0\nresponsivity_percent = 0.0\ngain_percent = 0.0\n\
+            "[uncertainty]\nzero_deg = {ZERO_DEG}\nangle_deg = 0.0\nplay_deg = 0.0\nencoder_deg = 0.0\ntilt_deg = 0.0\nresponsivity_percent = 0.0\ngain_percent = 0.0\n\
              nonlinearity_percent = 0.0\ncrosstalk_percent = 0.0\nsource_aperture_deg = 0.0\n\
              detector_aperture_deg = 0.0\n[sim]\nseed = {seed}\nlight_zero_deg = {}\nsensor_zero_deg = {}\n\
              light_backlash_deg = 0.0\nsensor_backlash_deg = 0.0\nsource_aperture_deg = 0.0\n\

@@ -69,7 +69,7 @@ async fn one(seed: u64, specimen: Arc<dyn Brdf>, whole: &mut Tally, grazing: &mu
     // The amounts of [uncertainty]; play and lobe-wide blur are systematic and have tests of their own.
     let text = format!(
         "[calibration]\nmonitor = 5.0\n[uncertainty]\nresponsivity_percent = 0.2\ngain_percent = 0.1\n\
-         nonlinearity_percent = 0.1\ncrosstalk_percent = 0.2\nangle_deg = 0.0\nzero_deg = 0.02\n\
+         nonlinearity_percent = 0.1\ncrosstalk_percent = 0.2\nangle_deg = 0.0\nplay_deg = 0.0\nencoder_deg = 0.0\ntilt_deg = 0.0\nzero_deg = 0.02\n\
          source_aperture_deg = 0.0\ndetector_aperture_deg = 0.0\n\
          [sim]\nseed = {}\nresponsivity_error = {}\nlight_zero_deg = {}\nsensor_zero_deg = {}\nstray_per_sr = {}\n\
          gain_error = {}\nnonlinearity = {}\ncrosstalk = {}\n\

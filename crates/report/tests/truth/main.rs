@@ -9,6 +9,7 @@ mod gap;
 mod light;
 mod photometer;
 mod range;
+mod servos;
 mod standards;
 mod uncertainty;
 mod verdicts;

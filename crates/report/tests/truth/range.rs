@@ -91,7 +91,8 @@ async fn seven_decades_in_one_sweep_are_told_within_their_uncertainty() {
         tally.before,
         tally.beside
     );
-    assert!((0.93..=0.97).contains(&share), "{share}");
+    // Of two ways to tell how steep the lobe is the steeper one is believed.
+    assert!((0.93..=0.98).contains(&share), "{share}");
     assert!((-3..=3).all(|decade| tally.decades.contains_key(&decade)));
     assert!(
         tally.before > 0 && tally.beside > 0,
@@ -105,7 +106,7 @@ async fn one(seed: u64, tally: &mut Tally) {
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
     let text = format!(
         "[uncertainty]\nresponsivity_percent = 0.2\ngain_percent = 0.1\nnonlinearity_percent = 0.1\n\
-         crosstalk_percent = 0.0\n[sim]\nseed = {}\nresponsivity_error = {}\nlight_zero_deg = {}\n\
+         crosstalk_percent = 0.0\nangle_deg = 0.01\nplay_deg = 0.02\nencoder_deg = 0.0\ntilt_deg = 0.0\n[sim]\nseed = {}\nresponsivity_error = {}\nlight_zero_deg = {}\n\
          sensor_zero_deg = {}\nstray_per_sr = {}\ngain_error = {}\nnonlinearity = {}\n",
         1000 + seed,
         0.002 * normal(),

@@ -12,7 +12,7 @@ use crate::bench::Laboratory;
 
 const THREE_PLANES: &str = include_str!("../../../../config/jobs/three-planes.toml");
 /// Arms that pass each other, so that nothing hides the peaks at small angles.
-const CAN_PASS: &str = "[envelope]\ncan_pass = true\n";
+const CAN_PASS: &str = "[envelope]\ncan_pass = true\n[uncertainty]\nplay_deg = 0.02\n";
 
 /// A capture of the three planes with its readings that count.
 struct Captured {

@@ -132,7 +132,17 @@ impl<'a> Reduction<'a> {
     /// # Panics
     /// If there are no exposures.
     pub fn combined(&self, exposures: &[Taken]) -> Result<Reflectance, Unusable> {
-        let pose = self.aligned(exposures[0].pose);
+        self.combined_at(self.aligned(exposures[0].pose), exposures)
+    }
+
+    /// The same of arms that are known to have been at `pose`, whatever their encoders said.
+    ///
+    /// # Errors
+    /// As [`Reduction::combined`].
+    ///
+    /// # Panics
+    /// If there are no exposures.
+    pub fn combined_at(&self, pose: Pose, exposures: &[Taken]) -> Result<Reflectance, Unusable> {
         let cosine = self.file.calibration.filling.arm(pose).rad().cos();
         if cosine.is_nan() || cosine < MIN_COSINE {
             return Err(Unusable::Grazing);

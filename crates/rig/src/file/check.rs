@@ -34,7 +34,7 @@ pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
     };
     let photometer = photometer(source, &raw.photometer)?;
     let calibration = calibration::constants(source, &raw.calibration)?;
-    let uncertainty = calibration::uncertainty(source, &raw.uncertainty)?;
+    let uncertainty = calibration::uncertainty(source, &raw.uncertainty, [&light, &sensor])?;
     let margin_rad = uncertainty.shadow_margin_rad();
     let visits = calibration::visits(source, &raw.calibration, &envelope, margin_rad)?;
     monitored(source, &raw.photometer, &photometer, &calibration, &visits)?;

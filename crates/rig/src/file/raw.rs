@@ -52,8 +52,6 @@ pub(super) struct RawEnvelope {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawMotion {
-    /// It was called tolerance_deg.
-    #[serde(alias = "tolerance_deg")]
     pub(super) near_deg: Spanned<f64>,
     pub(super) still_deg: Spanned<f64>,
     pub(super) settle_ms: Spanned<f64>,
@@ -116,7 +114,10 @@ pub(super) struct RawUncertainty {
     pub(super) nonlinearity_percent: Spanned<f64>,
     pub(super) crosstalk_percent: Spanned<f64>,
     pub(super) stray_per_sr: Spanned<f64>,
-    pub(super) angle_deg: Spanned<f64>,
+    pub(super) angle_deg: Spanned<toml::Value>,
+    pub(super) play_deg: Spanned<toml::Value>,
+    pub(super) encoder_deg: Spanned<f64>,
+    pub(super) tilt_deg: Spanned<f64>,
     pub(super) zero_deg: Spanned<f64>,
     pub(super) source_aperture_deg: Spanned<f64>,
     pub(super) detector_aperture_deg: Spanned<f64>,

@@ -13,6 +13,9 @@ use crate::error::Place;
 /// Span of values that come from the built-in file: no line of the user's file is to blame for them.
 const BUILT_IN: Range<usize> = 0..0;
 
+/// Keys that had another name once: table, old name, new name.
+const RENAMED: [(&str, &str, &str); 1] = [("motion", "tolerance_deg", "near_deg")];
+
 /// The text of a rig file with its name; turns spans into lines.
 pub(super) struct Source<'a> {
     pub(super) text: &'a str,
@@ -24,7 +27,8 @@ impl Source<'_> {
     pub(super) fn raw(&self, built_in: &str) -> Result<RawFile, RigError> {
         let mut base = DeTable::parse(built_in).map_err(|error| self.syntax(&error))?;
         unplace(base.get_mut());
-        let own = DeTable::parse(self.text).map_err(|error| self.syntax(&error))?;
+        let mut own = DeTable::parse(self.text).map_err(|error| self.syntax(&error))?;
+        self.rename(own.get_mut())?;
         overlay(base.get_mut(), own.into_inner());
         config::of_table(base).map_err(|flaws| RigError::Form {
             place: self.place(flaws.first().span.as_ref()),
@@ -38,7 +42,16 @@ impl Source<'_> {
         let table = |text: &str| text.parse::<toml::Table>().map_err(|error| self.syntax(&error));
         let mut all = table(built_in)?;
         merge(&mut all, table(self.text)?);
+        // From which side an arm comes to a pose says to which side it leans: zeros hold for that alone. Certificates that
+        // were made without an approach keep their fingerprint.
+        let approach = all
+            .get("motion")
+            .and_then(|motion| motion.get("approach"))
+            .cloned();
         all.retain(|key, _| ["light", "sensor", "photometer", "calibration"].contains(&key));
+        if let Some(approach) = approach.filter(|approach| approach.as_str() != Some("none")) {
+            all.insert("approach".to_owned(), approach);
+        }
         for (name, value) in &mut all {
             let Some(keys) = value.as_table_mut() else {
                 continue;
@@ -55,6 +68,27 @@ impl Source<'_> {
         }
         let hash = Sha256::digest(all.to_string());
         Ok(hash.iter().map(|byte| format!("{byte:02x}")).collect())
+    }
+
+    /// Gives keys that had another name once the one that they have now.
+    fn rename(&self, table: &mut DeTable<'_>) -> Result<(), RigError> {
+        for (name, old, new) in RENAMED {
+            let Some(DeValue::Table(keys)) = table.get_mut(name).map(Spanned::get_mut) else {
+                continue;
+            };
+            let Some((key, value)) = keys.remove_entry(old) else {
+                continue;
+            };
+            if keys.contains_key(new) {
+                return Err(RigError::Form {
+                    place: self.place(Some(&key.span())),
+                    key: Some(format!("{name}.{old}")),
+                    why: format!("it is the old name of {new}, which is given too: leave it out"),
+                });
+            }
+            keys.insert(Spanned::new(key.span(), new.into()), value);
+        }
+        Ok(())
     }
 
     fn syntax(&self, error: &toml::de::Error) -> RigError {

@@ -261,6 +261,48 @@ fn a_missing_file_is_named() {
 }
 
 #[test]
+fn a_key_by_its_old_name_is_read_and_not_beside_its_new_one() {
+    let near = |text: &str| parse(text).map(|file| file.motion.near_rad.to_degrees());
+    assert!((near("[motion]\ntolerance_deg = 0.25").unwrap() - 0.25).abs() < 1e-12);
+    let error = near("[motion]\nnear_deg = 0.3\ntolerance_deg = 0.25")
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("motion.tolerance_deg") && error.contains("near_deg"),
+        "{error}"
+    );
+    let range = near("\n[motion]\ntolerance_deg = 50").unwrap_err().to_string();
+    assert!(range.contains("0.05 … 5") && range.contains('3'), "{range}");
+}
+
+#[test]
+fn angles_are_as_unsure_as_the_servos_manual_says_unless_told_otherwise() {
+    let deg = |text: &str| {
+        let known = parse(text).unwrap().uncertainty;
+        [known.play_rad, known.angle_rad].map(|of| of.map(f64::to_degrees))
+    };
+    let close = |[a, b]: [f64; 2], [x, y]: [f64; 2]| (a - x).abs() < 1e-9 && (b - y).abs() < 1e-9;
+    let [play, angle] = deg("");
+    assert!(close(play, [0.25; 2]), "{play:?}");
+    assert!(close(angle, [360.0 / 4096.0 / 12_f64.sqrt(); 2]), "{angle:?}");
+    let [play, angle] = deg("[light]\ngear = 2.0\n[sensor]\nmodel = \"MX-28\"");
+    assert!(close(play, [0.125, 1.0 / 3.0]), "{play:?}");
+    assert!((angle[1] / angle[0] - 2.0).abs() < 1e-9, "{angle:?}");
+    let [play, angle] = deg("[uncertainty]\nplay_deg = 0\nangle_deg = 0.01");
+    assert!(close(play, [0.0; 2]) && close(angle, [0.01; 2]));
+    for bad in [
+        "play_deg = \"manual\"",
+        "play_deg = -1",
+        "angle_deg = [1, 2]",
+        "play_deg = nan",
+    ] {
+        let error = parse(&format!("[uncertainty]\n{bad}")).unwrap_err().to_string();
+        let key = bad.split(' ').next().unwrap();
+        assert!(error.contains(&format!("uncertainty.{key}")), "{error}");
+    }
+}
+
+#[test]
 fn the_fingerprint_follows_what_a_calibration_depends_on() {
     let print = |text: &str| parse(text).unwrap().fingerprint;
     let plain = print("");
@@ -278,6 +320,7 @@ fn the_fingerprint_follows_what_a_calibration_depends_on() {
         "[photometer]\nfull_scale = 1000000",
         "[calibration]\nfilling = \"under\"",
         "[calibration]\nmonitor = 5.1",
+        "[motion]\napproach = \"up\"",
     ] {
         assert_ne!(print(other), plain, "{other}");
     }

@@ -20,6 +20,9 @@ pub struct Series {
     pub velocity_unit_rpm: f64,
     /// Unit of the acceleration registers, rev/min².
     pub acceleration_unit_rpm2: f64,
+    /// Play of the gear, degrees of the servo, as the specifications of the e-manual say; of a series for which they say
+    /// nothing that of the X series.
+    pub backlash_deg: f64,
     /// Whether position 0 is in the middle of the single turn of position mode, rather than at its lower end.
     pub centred: bool,
     /// Largest position beyond a turn, counts.
@@ -105,6 +108,7 @@ const X_TABLE: Series = Series {
     ram: RAM,
     velocity_unit_rpm: 0.229,
     acceleration_unit_rpm2: 214.577,
+    backlash_deg: 15.0 / 60.0,
     centred: false,
     multi_turn: 1_048_575,
     profile_velocity_max: 32_767,
@@ -142,6 +146,7 @@ pub(super) static X: Series = X_TABLE;
 pub(super) static MX: Series = Series {
     name: "MX (2.0)",
     buses: &["-T", "-R", "T", "R", "AT", "AR"],
+    backlash_deg: 20.0 / 60.0,
     startup: false,
     backup_ready: None,
     firmware: 43,
@@ -173,6 +178,7 @@ pub(super) static P: Series = Series {
     ram: 512,
     velocity_unit_rpm: 0.01,
     acceleration_unit_rpm2: 1.0,
+    backlash_deg: 6.0 / 60.0,
     centred: true,
     multi_turn: i32::MAX,
     profile_velocity_max: 2920,

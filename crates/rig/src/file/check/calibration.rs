@@ -8,7 +8,7 @@ use toml::Spanned;
 
 use crate::file::raw::{RawCalibration, RawUncertainty};
 use crate::file::source::Source;
-use crate::file::{Certificates, Uncertainties, Visits};
+use crate::file::{ArmSettings, Certificates, Uncertainties, Visits};
 use crate::{Calibration, Filling, Lamp, RigError};
 
 /// Minutes in a day.
@@ -92,7 +92,14 @@ pub(super) fn certificates(source: &Source<'_>, raw: &RawCalibration) -> Result<
     })
 }
 
-pub(super) fn uncertainty(source: &Source<'_>, raw: &RawUncertainty) -> Result<Uncertainties, RigError> {
+/// Standard deviation of what is rounded to whole counts, counts.
+const ROUNDED: f64 = 0.288_675_134_594_812_9;
+
+pub(super) fn uncertainty(
+    source: &Source<'_>,
+    raw: &RawUncertainty,
+    arms: [&ArmSettings; 2],
+) -> Result<Uncertainties, RigError> {
     let within = |key: &str, value: &Spanned<f64>, max: f64| {
         source.within(&format!("uncertainty.{key}"), value, 0.0..=max)
     };
@@ -107,11 +114,43 @@ pub(super) fn uncertainty(source: &Source<'_>, raw: &RawUncertainty) -> Result<U
         nonlinearity: percent("nonlinearity_percent", &raw.nonlinearity_percent, 20.0)?,
         crosstalk: percent("crosstalk_percent", &raw.crosstalk_percent, 50.0)?,
         stray_per_sr: within("stray_per_sr", &raw.stray_per_sr, 1.0)?,
-        angle_rad: radians("angle_deg", &raw.angle_deg)?,
+        angle_rad: of_arms(source, "angle_deg", &raw.angle_deg, 10.0, arms, |arm| {
+            ROUNDED * arm.axis.resolution_rad().to_degrees()
+        })?,
+        play_rad: of_arms(source, "play_deg", &raw.play_deg, 5.0, arms, |arm| {
+            arm.model.series.backlash_deg / arm.axis.gear
+        })?,
+        encoder_rad: radians("encoder_deg", &raw.encoder_deg)?,
+        tilt_rad: radians("tilt_deg", &raw.tilt_deg)?,
         zero_rad: radians("zero_deg", &raw.zero_deg)?,
         apertures_rad: [
             radians("source_aperture_deg", &raw.source_aperture_deg)?,
             radians("detector_aperture_deg", &raw.detector_aperture_deg)?,
         ],
     })
+}
+
+/// An angle of each arm, rad: by its servo, or one for both in degrees.
+fn of_arms(
+    source: &Source<'_>,
+    key: &str,
+    value: &Spanned<toml::Value>,
+    max_deg: f64,
+    arms: [&ArmSettings; 2],
+    of_servo_deg: impl Fn(&ArmSettings) -> f64,
+) -> Result<[f64; 2], RigError> {
+    let key = format!("uncertainty.{key}");
+    let whole = |value: &toml::Value| value.as_integer().map(|whole| whole as f64);
+    match value.get_ref() {
+        toml::Value::String(word) if word == "model" => Ok(arms.map(|arm| of_servo_deg(arm).to_radians())),
+        number if number.is_float() || number.is_integer() => {
+            let deg = number.as_float().or(whole(number)).unwrap_or(f64::NAN);
+            let deg = source.within(&key, &Spanned::new(value.span(), deg), 0.0..=max_deg)?;
+            Ok([deg.to_radians(); 2])
+        }
+        other => {
+            let allowed = format!("\"model\", or degrees for both arms, 0 … {max_deg}");
+            Err(source.refuse(&key, value, other, allowed))
+        }
+    }
 }
