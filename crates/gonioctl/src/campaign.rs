@@ -4,9 +4,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use session::Status;
-use study::{Campaign, Script, Wrong};
+use study::{Campaign, Campaigned, Script, Wrong};
 
 use crate::exit;
+use crate::junit::{Case, Junit, Outcome};
 
 /// Fresh seeds are below this, so that they are short enough to be typed.
 const SEEDS: u64 = 1_000_000_000;
@@ -14,11 +15,12 @@ const SEEDS: u64 = 1_000_000_000;
 /// Carries out a campaign and prints each capture that went wrong as a script to replay.
 ///
 /// # Errors
-/// Stdout refuses.
+/// Stdout refuses, or the file for CI servers cannot be written.
 pub(crate) fn campaign(
     captures: u64,
     seed: Option<u64>,
     over_wire: bool,
+    junit: Option<&Junit>,
     as_json: bool,
 ) -> anyhow::Result<ExitCode> {
     let fresh = || {
@@ -49,6 +51,9 @@ pub(crate) fn campaign(
         campaigned.readings,
         campaigned.bad
     ));
+    if let Some(junit) = junit {
+        junit.write(&cases(seed, &campaigned))?;
+    }
     if as_json {
         terminal::json(&campaigned)?;
     } else {
@@ -62,12 +67,34 @@ pub(crate) fn campaign(
     Ok(verdict(campaigned.wrong.is_empty()))
 }
 
+/// Each capture as a test.
+fn cases(seed: u64, campaigned: &Campaigned) -> Vec<Case> {
+    let name = |seed: u64| format!("capture of seed {seed}");
+    let wrong = |seed| {
+        let wrong = campaigned.wrong.iter().find(|wrong| wrong.script.seed == seed)?;
+        Some(Case::new(name(seed), Outcome::Failed(wrong.why.clone())).saying(wrong.script.to_string()))
+    };
+    let seeds = (0..campaigned.captures).map(|i| seed.wrapping_add(i));
+    seeds
+        .map(|seed| wrong(seed).unwrap_or_else(|| Case::new(name(seed), Outcome::Passed)))
+        .collect()
+}
+
 /// Carries out one script.
 ///
 /// # Errors
-/// The file is no script; stdout refuses.
-pub(crate) fn replay(script: &Path, as_json: bool) -> anyhow::Result<ExitCode> {
-    let carried = Script::read(script)?.carry();
+/// The file is no script, or the one for CI servers cannot be written; stdout refuses.
+pub(crate) fn replay(path: &Path, junit: Option<&Junit>, as_json: bool) -> anyhow::Result<ExitCode> {
+    let script = Script::read(path)?;
+    let carried = script.carry();
+    if let Some(junit) = junit {
+        let outcome = match &carried {
+            Ok(_) => Outcome::Passed,
+            Err(why) => Outcome::Failed(why.clone()),
+        };
+        let name = format!("replay of {}", path.display());
+        junit.write(&[Case::new(name, outcome).saying(script.to_string())])?;
+    }
     match &carried {
         Ok(carried) if as_json => terminal::json(carried)?,
         Ok(carried) if carried.bad => terminal::line(format_args!(

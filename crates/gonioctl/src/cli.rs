@@ -1,5 +1,6 @@
 use std::path::PathBuf;
 
+use anyhow::Result;
 use api::client::Refused;
 use api::{Client, ClientError, JobId};
 use clap::builder::PossibleValuesParser;
@@ -7,12 +8,14 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use formats::FORMATS;
 
+use crate::bound::Bound;
 use crate::export;
+use crate::junit::Junit;
 
 /// Measures how a flat specimen reflects light, with two servo arms and a photometer.
 ///
-/// Data goes to stdout, talk to stderr. Exit codes: 0 done; 2 bad arguments, config or file; 3 rig fault or missing
-/// device; 4 stopped before the end, resumable, also a full disk; 5 the daemon cannot be reached, or refuses; 6 measured,
+/// Data goes to stdout, talk to stderr. Exit codes: 0 done; 1 an error is above the bound of `eval --fail-above`; 2 bad
+/// arguments, config or file; 3 rig fault or missing device; 4 stopped before the end, resumable, also a full disk; 5 the daemon cannot be reached, or refuses; 6 measured,
 /// but not usable: no or unusable readings, or no reconstruction.
 #[derive(Debug, Parser)]
 #[command(name = "gonioctl", version, max_term_width = 100)]
@@ -37,6 +40,8 @@ pub(crate) enum Command {
         #[arg(long, value_name = "DIR", default_value = "runs")]
         out: PathBuf,
         #[command(flatten)]
+        junit: JunitArgument,
+        #[command(flatten)]
         output: Output,
     },
     /// Try whether the rig behaves as this program expects of it. Moves the arms: stand by.
@@ -47,6 +52,8 @@ pub(crate) enum Command {
         #[arg(long)]
         restart: bool,
         #[command(flatten)]
+        junit: JunitArgument,
+        #[command(flatten)]
         output: Output,
     },
     /// Say what a job would do: readings, seconds, what is left out and why. Touches no hardware.
@@ -55,6 +62,10 @@ pub(crate) enum Command {
         job: PathBuf,
         #[command(flatten)]
         rig: RigArgument,
+        /// Print a key of the job on this rig instead, under which its results can be kept: it is another one whenever what
+        /// would be measured, or how, is another, and does not depend on comments, white space or the order of keys.
+        #[arg(long)]
+        hash: bool,
         #[command(flatten)]
         output: Output,
     },
@@ -224,6 +235,11 @@ pub(crate) enum Command {
         truth: String,
         /// The estimate, likewise.
         estimate: String,
+        /// Exit with 1 where a metric is above a bound, or has no value: names of the table, such as male=0.001,p95_rel=0.2.
+        #[arg(long, value_name = "METRIC=BOUND", value_delimiter = ',')]
+        fail_above: Vec<Bound>,
+        #[command(flatten)]
+        junit: JunitArgument,
         #[command(flatten)]
         output: Output,
     },
@@ -267,6 +283,8 @@ pub(crate) enum Command {
         /// Do one script again.
         #[arg(long, value_name = "FILE", conflicts_with_all = ["captures", "seed", "wire"])]
         replay: Option<PathBuf>,
+        #[command(flatten)]
+        junit: JunitArgument,
         #[command(flatten)]
         output: Output,
     },
@@ -371,6 +389,29 @@ pub(crate) enum ArmName {
     Light,
     /// The one that carries the sensor.
     Sensor,
+}
+
+/// A file for CI servers.
+#[derive(Debug, Args)]
+pub(crate) struct JunitArgument {
+    /// Also write what was found as a JUnit XML file, which CI servers show.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) junit: Option<PathBuf>,
+}
+
+impl JunitArgument {
+    /// Does something of which the file tells, also where it fails.
+    ///
+    /// # Errors
+    /// The file cannot be written; those of what is done.
+    pub(crate) fn of<T>(self, suite: &str, act: impl FnOnce(Option<&Junit>) -> Result<T>) -> Result<T> {
+        let junit = self.junit.map(|path| Junit::begin(&path, suite)).transpose()?;
+        let done = act(junit.as_ref());
+        if let (Some(junit), Err(error)) = (&junit, &done) {
+            junit.error(&format!("{error:#}"))?;
+        }
+        done
+    }
 }
 
 /// How results are printed.

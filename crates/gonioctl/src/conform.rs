@@ -5,13 +5,19 @@ use rig::conform;
 use session::OpenRig;
 
 use crate::findings::Findings;
+use crate::junit::Junit;
 use crate::signals::Signals;
 
 /// Tries whether a rig behaves as this program expects of it; moves the arms.
 ///
 /// # Errors
 /// The rig file is wrong, or its port cannot be used.
-pub(crate) fn conform(rig: Option<&Path>, restart: bool, as_json: bool) -> anyhow::Result<ExitCode> {
+pub(crate) fn conform(
+    rig: Option<&Path>,
+    restart: bool,
+    junit: Option<&Junit>,
+    as_json: bool,
+) -> anyhow::Result<ExitCode> {
     let (file, name) = session::rig_file(rig)?;
     let mut findings = Findings::new(as_json);
     let mut rig = OpenRig::open(&file, &name.display().to_string())?;
@@ -34,5 +40,5 @@ pub(crate) fn conform(rig: Option<&Path>, restart: bool, as_json: bool) -> anyho
         }
         Ok(())
     })?;
-    findings.end(&name)
+    findings.end(&name, junit)
 }

@@ -6,6 +6,7 @@ use rig::{Device, Drive, Dynamixel, RigFile};
 use session::RigPort;
 
 use crate::findings::Findings;
+use crate::junit::Junit;
 use crate::signals::Signals;
 
 /// Devices of a rig: two servos and the photometer.
@@ -15,12 +16,17 @@ const ALL: usize = 3;
 ///
 /// # Errors
 /// The rig file is wrong.
-pub(crate) fn doctor(rig: Option<&Path>, out: &Path, as_json: bool) -> anyhow::Result<ExitCode> {
+pub(crate) fn doctor(
+    rig: Option<&Path>,
+    out: &Path,
+    junit: Option<&Junit>,
+    as_json: bool,
+) -> anyhow::Result<ExitCode> {
     let (file, name) = session::rig_file(rig)?;
     let port = RigPort::new(&file, &name.display().to_string())?;
     let mut findings = Findings::new(as_json);
     examine(port.path(), &file, out, &mut |finding| findings.tell(finding))?;
-    findings.end(&name)
+    findings.end(&name, junit)
 }
 
 /// All checks, from the machine to the light; those that build on one that failed are left out.

@@ -5,6 +5,7 @@ use serde_json::json;
 use session::Status;
 
 use crate::exit;
+use crate::junit::{Case, Junit, Outcome};
 
 /// Widest bar of the histogram, characters.
 const BAR: usize = 40;
@@ -35,8 +36,11 @@ impl Findings {
     /// The exit code of all: 3 where something fails.
     ///
     /// # Errors
-    /// Stdout refuses.
-    pub(crate) fn end(self, rig: &std::path::Path) -> anyhow::Result<ExitCode> {
+    /// Stdout refuses, or the file for CI servers cannot be written.
+    pub(crate) fn end(self, rig: &std::path::Path, junit: Option<&Junit>) -> anyhow::Result<ExitCode> {
+        if let Some(junit) = junit {
+            junit.write(&self.all.iter().map(case).collect::<Vec<_>>())?;
+        }
         let worst = self.all.iter().map(|finding| finding.verdict).max();
         if self.as_json {
             terminal::json(&json!({ "rig": rig, "verdict": worst, "findings": self.all }))?;
@@ -45,6 +49,21 @@ impl Findings {
             Some(Verdict::Fail) => exit::code(Status::Rig),
             _ => ExitCode::SUCCESS,
         })
+    }
+}
+
+/// A finding as a test: a warning passes, with what it says.
+fn case(finding: &Finding) -> Case {
+    let remedy = finding.remedy.as_ref().map(|remedy| format!(" -> {remedy}"));
+    let said = format!(
+        "{}: {}{}",
+        finding.verdict,
+        finding.text,
+        remedy.unwrap_or_default()
+    );
+    match finding.verdict {
+        Verdict::Fail => Case::new(finding.check, Outcome::Failed(said)),
+        _ => Case::new(finding.check, Outcome::Passed).saying(said),
     }
 }
 

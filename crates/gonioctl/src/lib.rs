@@ -3,6 +3,7 @@
 //! Data goes to stdout, talk to stderr; the exit code says how it ended.
 
 mod acknowledge;
+mod bound;
 mod calibrate;
 mod campaign;
 mod cli;
@@ -16,6 +17,7 @@ mod eval;
 mod exit;
 mod export;
 mod findings;
+mod junit;
 mod manual;
 mod operator;
 mod plan;
@@ -75,11 +77,35 @@ fn tell_machines(status: Status, text: &str) {
 fn command(command: Command) -> anyhow::Result<ExitCode> {
     match command {
         Command::Ports { output } => ports::ports(output.json)?,
-        Command::Doctor { rig, out, output } => return doctor::doctor(rig.rig.as_deref(), &out, output.json),
-        Command::Conform { rig, restart, output } => {
-            return conform::conform(rig.rig.as_deref(), restart, output.json);
+        Command::Doctor {
+            rig,
+            out,
+            junit,
+            output,
+        } => {
+            return junit.of("doctor", |junit| {
+                doctor::doctor(rig.rig.as_deref(), &out, junit, output.json)
+            });
         }
-        Command::Plan { job, rig, output } => plan::plan(&job, rig.rig.as_deref(), output.json)?,
+        Command::Conform {
+            rig,
+            restart,
+            junit,
+            output,
+        } => {
+            return junit.of("conform", |junit| {
+                conform::conform(rig.rig.as_deref(), restart, junit, output.json)
+            });
+        }
+        Command::Plan {
+            job,
+            rig,
+            hash,
+            output,
+        } => match hash {
+            true => plan::hash(&job, rig.rig.as_deref(), output.json)?,
+            false => plan::plan(&job, rig.rig.as_deref(), output.json)?,
+        },
         Command::Run {
             job,
             rig,
@@ -139,8 +165,14 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
         Command::Eval {
             truth,
             estimate,
+            fail_above,
+            junit,
             output,
-        } => eval::eval(&truth, &estimate, output.json)?,
+        } => {
+            return junit.of("eval", |junit| {
+                eval::eval(&truth, &estimate, &fail_above, junit, output.json)
+            });
+        }
         Command::Study {
             study,
             on,
@@ -153,11 +185,14 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             seed,
             wire,
             replay,
+            junit,
             output,
-        } => match replay {
-            Some(script) => return campaign::replay(&script, output.json),
-            None => return campaign::campaign(captures, seed, wire, output.json),
-        },
+        } => {
+            return junit.of("campaign", |junit| match replay {
+                Some(script) => campaign::replay(&script, junit, output.json),
+                None => campaign::campaign(captures, seed, wire, junit, output.json),
+            });
+        }
         Command::Completions { shell } => manual::completions(shell)?,
         Command::Man { directory } => manual::man(&directory)?,
         Command::Reconstruct { run, output } => return reconstruct::reconstruct(run, output.json),

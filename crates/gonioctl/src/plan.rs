@@ -1,4 +1,5 @@
 use std::path::Path;
+use std::time::SystemTime;
 
 use serde_json::json;
 use session::RunRequest;
@@ -30,6 +31,20 @@ pub(crate) fn plan(job: &Path, rig: Option<&Path>, as_json: bool) -> anyhow::Res
     list(&plan, order.light(&plan))?;
     if let Some(until) = order.job.until {
         terminal::line(then(until))?;
+    }
+    Ok(())
+}
+
+/// Prints the key under which the results of a job on a rig can be kept.
+///
+/// # Errors
+/// What is wrong with the job or the rig file.
+pub(crate) fn hash(job: &Path, rig: Option<&Path>, as_json: bool) -> anyhow::Result<()> {
+    let order = RunRequest::read(job, rig)?;
+    let hash = order.hash(&order.plan(None)?, SystemTime::now())?;
+    match as_json {
+        true => terminal::json(&json!({ "hash": hash }))?,
+        false => terminal::line(hash)?,
     }
     Ok(())
 }

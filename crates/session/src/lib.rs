@@ -11,6 +11,7 @@ mod error;
 mod open_rig;
 mod rig_port;
 mod run;
+mod run_hash;
 mod run_request;
 mod status;
 

@@ -6,6 +6,8 @@ use capture::Outcome;
 pub enum Status {
     /// Everything was done.
     Done = 0,
+    /// An error is above the bound that was given: a gate is closed.
+    Above = 1,
     /// Bad arguments, config or file; nothing was touched.
     Invalid = 2,
     /// Rig fault or missing device.
