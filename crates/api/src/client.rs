@@ -15,7 +15,6 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use ureq::http::{Method, Request};
 use ureq::tls::TlsConfig;
-use ureq::unversioned::resolver::DefaultResolver;
 use ureq::{Agent, Body, SendBody};
 
 pub use error::{ClientError, Refused};
@@ -24,7 +23,7 @@ pub use stream::{Message, ServerSentEvent, Stream};
 use crate::{Action, Job, JobId, Jog, RigView, RunView};
 use place::Place;
 use roots::roots;
-use unix::UnixConnector;
+use unix::{NoNames, UnixConnector};
 
 /// A daemon on this machine answers at once; one at the end of a poor line should have by then.
 const CONNECT: Duration = Duration::from_secs(5);
@@ -86,7 +85,7 @@ impl Client {
         let (agent, base) = match address.strip_prefix(UNIX) {
             Some(path) => {
                 let connector = UnixConnector::new(path);
-                let agent = Agent::with_parts(config, connector, DefaultResolver::default());
+                let agent = Agent::with_parts(config, connector, NoNames);
                 (agent, "http://localhost".to_owned())
             }
             None => {

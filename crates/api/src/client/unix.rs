@@ -1,7 +1,11 @@
 use std::io::{self, Read, Write};
+use std::net::{Ipv4Addr, SocketAddr};
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 
+use ureq::config::Config;
+use ureq::http::Uri;
+use ureq::unversioned::resolver::{ResolvedSocketAddrs, Resolver};
 use ureq::unversioned::transport::{
     Buffers, ConnectionDetails, Connector, LazyBuffers, NextTimeout, Transport,
 };
@@ -31,6 +35,18 @@ impl Connector<()> for UnixConnector {
         let config = details.config;
         let buffers = LazyBuffers::new(config.input_buffer_size(), config.output_buffer_size());
         Ok(Some(UnixTransport { stream, buffers }))
+    }
+}
+
+/// Asks nobody where a host is: the socket file is where it is. A small system may not even know `localhost`.
+#[derive(Debug)]
+pub(super) struct NoNames;
+
+impl Resolver for NoNames {
+    fn resolve(&self, _: &Uri, _: &Config, _: NextTimeout) -> Result<ResolvedSocketAddrs, Error> {
+        let mut addresses = self.empty();
+        addresses.push(SocketAddr::from((Ipv4Addr::LOCALHOST, 0)));
+        Ok(addresses)
     }
 }
 
@@ -82,5 +98,35 @@ impl std::fmt::Debug for UnixTransport {
         f.debug_struct("UnixTransport")
             .field("stream", &self.stream)
             .finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::os::unix::net::UnixListener;
+
+    use ureq::Agent;
+
+    use super::*;
+
+    #[test]
+    fn a_socket_file_is_reached_where_no_name_is_known() {
+        let directory = tempfile::tempdir().unwrap();
+        let path = directory.path().join("socket");
+        let listener = UnixListener::bind(&path).unwrap();
+        let answering = std::thread::spawn(move || {
+            let (mut stream, _) = listener.accept().unwrap();
+            let mut asked = [0; 1024];
+            let read = stream.read(&mut asked).unwrap();
+            assert!(asked[..read].starts_with(b"GET /health"));
+            stream
+                .write_all(b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nok")
+                .unwrap();
+        });
+        let agent = Agent::with_parts(Config::default(), UnixConnector::new(&path), NoNames);
+        // No host ever has a name that ends so (RFC 6761).
+        let mut answer = agent.get("http://goniod.invalid/health").call().unwrap();
+        assert_eq!(answer.body_mut().read_to_string().unwrap(), "ok");
+        answering.join().unwrap();
     }
 }
