@@ -209,9 +209,10 @@ fn with_json_every_error_is_an_object_on_stdout() {
         let finished = run(GONIOCTL, here, &[arguments, &["--json"]].concat()).expect(code);
         let object: serde_json::Value = serde_json::from_str(&finished.stdout)
             .unwrap_or_else(|error| panic!("{arguments:?}: {error}: {:?}", finished.stdout));
-        assert_eq!(object["exit_status"], code, "{arguments:?}: {object}");
+        let error = &object["error"];
+        assert_eq!(error["exit_status"], code, "{arguments:?}: {object}");
         assert!(
-            object["error"].as_str().is_some_and(|text| !text.is_empty()),
+            error["message"].as_str().is_some_and(|text| !text.is_empty()),
             "{object}"
         );
         assert!(!finished.stderr.is_empty(), "{arguments:?}");

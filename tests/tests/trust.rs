@@ -190,7 +190,7 @@ fn nothing_in_a_job_file_reaches_a_terminal_or_the_log_as_it_stands() {
         }
         let jobs: serde_json::Value =
             serde_json::from_str(&daemon.gonioctl(&["jobs", "--json"]).expect(0).stdout).unwrap();
-        assert_eq!(jobs[0]["specimen"], HOSTILE, "machines read it as it is");
+        assert_eq!(jobs["jobs"][0]["specimen"], HOSTILE, "machines read it as it is");
         assert_harmless("log", &daemon.read("log"));
     }
 }

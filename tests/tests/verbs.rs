@@ -181,7 +181,7 @@ fn a_specimen_is_submitted_laid_on_the_stage_and_watched_to_its_end() {
     assert!(!listed.contains(&id), "what is over is not listed: {listed}");
     let all: Value =
         serde_json::from_str(&service.gonioctl(&["jobs", "--all", "--json"]).expect(0).stdout).unwrap();
-    assert_eq!(all[0]["state"], "done");
+    assert_eq!(all["jobs"][0]["state"], "done");
 }
 
 #[test]
@@ -297,7 +297,7 @@ fn run_lays_the_specimen_on_the_stage_of_a_daemon_that_has_the_rig_and_of_no_oth
     );
     let all: Value =
         serde_json::from_str(&service.gonioctl(&["jobs", "--all", "--json"]).expect(0).stdout).unwrap();
-    assert_eq!(all[0]["state"], "done", "{all:#}");
+    assert_eq!(all["jobs"][0]["state"], "done", "{all:#}");
     fs::write(
         service.directory.path().join("other.toml"),
         "[envelope]\nseparation_deg = 7.0\n",
@@ -487,7 +487,8 @@ fn a_store_is_backed_up_while_the_daemon_runs_and_brought_back() {
     );
     (service.child, service.address) = launch(&here, &["--listen", "127.0.0.1:0"]);
     let told = service.gonioctl(&["jobs", "--all", "--json"]).expect(0).stdout;
-    let jobs: Value = serde_json::from_str(&told).unwrap();
+    let told: Value = serde_json::from_str(&told).unwrap();
+    let jobs = &told["jobs"];
     assert_eq!(jobs.as_array().unwrap().len(), 1, "{jobs}");
     assert_eq!(
         (&jobs[0]["id"], &jobs[0]["state"]),

@@ -3,6 +3,7 @@ use std::process::ExitCode;
 
 use api::{Acknowledgement, Client, FaultId, FaultView};
 
+use crate::document;
 use crate::error::CommandError;
 
 /// Acknowledges the newest latched fault: the one that is named, else the one that is shown and confirmed on the
@@ -23,7 +24,7 @@ pub(crate) fn acknowledge(daemon: &Client, fault: Option<&str>, as_json: bool) -
         terminal::say(format_args!("still latched: {}", described(fault)));
     }
     if as_json {
-        terminal::json(&rig)?;
+        document::RIG_STATE.print(&rig)?;
     }
     Ok(ExitCode::SUCCESS)
 }

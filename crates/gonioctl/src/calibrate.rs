@@ -10,6 +10,7 @@ use session::{Calibrated, Calibration};
 use tokio::sync::watch;
 
 use crate::cli::{CalibrateArguments, OnStage};
+use crate::document;
 use crate::exit;
 use crate::progress::Progress;
 use crate::run::obey;
@@ -45,7 +46,7 @@ pub(crate) fn calibrate(arguments: &CalibrateArguments) -> anyhow::Result<ExitCo
         anyhow::Ok(calibrated?)
     })?;
     if arguments.output.json {
-        terminal::json(&json!({
+        document::CALIBRATION.print(&json!({
             "outcome": calibrated.outcome,
             "directory": calibrated.directory,
             "certificate": calibrated.certificate.as_ref().map(|(certificate, _)| certificate),

@@ -3,9 +3,11 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
+use serde_json::json;
 use session::Status;
 use study::{Campaign, Campaigned, Script, Wrong};
 
+use crate::document;
 use crate::exit;
 use crate::junit::{Case, Junit, Outcome};
 
@@ -55,7 +57,7 @@ pub(crate) fn campaign(
         junit.write(&cases(seed, &campaigned))?;
     }
     if as_json {
-        terminal::json(&campaigned)?;
+        document::CAMPAIGN.print(&campaigned)?;
     } else {
         for Wrong { script, why } in &campaigned.wrong {
             terminal::line(format_args!("# {}", why.replace('\n', " ")))?;
@@ -96,7 +98,8 @@ pub(crate) fn replay(path: &Path, junit: Option<&Junit>, as_json: bool) -> anyho
         junit.write(&[Case::new(name, outcome).saying(script.to_string())])?;
     }
     match &carried {
-        Ok(carried) if as_json => terminal::json(carried)?,
+        Ok(carried) if as_json => document::REPLAY.print(carried)?,
+        Err(why) if as_json => document::REPLAY.print(&json!({ "wrong": why }))?,
         Ok(carried) if carried.bad => terminal::line(format_args!(
             "{} executions, and its report says that it is not to be believed",
             carried.executions

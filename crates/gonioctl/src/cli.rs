@@ -9,8 +9,8 @@ use clap_complete::Shell;
 use formats::FORMATS;
 
 use crate::bound::Bound;
-use crate::export;
 use crate::junit::Junit;
+use crate::{export, schema};
 
 /// Measures how a flat specimen reflects light, with two servo arms and a photometer.
 ///
@@ -287,6 +287,12 @@ pub(crate) enum Command {
         junit: JunitArgument,
         #[command(flatten)]
         output: Output,
+    },
+    /// Print the JSON Schema of a job file, of a rig file, or of something that a command prints with --json.
+    Schema {
+        /// "job", "rig", or what stands before the / in the key "schema" of the JSON that is printed.
+        #[arg(value_name = "NAME", value_parser = PossibleValuesParser::new(schema::names()))]
+        name: String,
     },
     /// Print the script with which a shell completes these commands.
     Completions {

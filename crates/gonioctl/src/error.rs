@@ -9,7 +9,7 @@ pub(crate) enum CommandError {
     /// It could not begin now.
     #[error("the daemon cannot run this now: {0}")]
     Busy(String),
-    /// A job ended before it had a run.
+    /// A job ended before it had a run, or the daemon's program could not do what it was asked.
     #[error("{why}")]
     Unbegun {
         /// What kept it from beginning.

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use session::Status;
 
 use crate::bound::{Bound, Bounded};
+use crate::document;
 use crate::exit;
 use crate::junit::{Case, Junit, Outcome};
 
@@ -47,7 +48,7 @@ pub(crate) fn eval(
     }
     if as_json {
         comparison["bounds"] = json!(bounded);
-        terminal::json(&comparison)?;
+        document::METRICS.print(&comparison)?;
     } else {
         for line in lines(&comparison) {
             terminal::line(line)?;

@@ -4,6 +4,7 @@ use rig::doctor::{Bin, Finding, Verdict};
 use serde_json::json;
 use session::Status;
 
+use crate::document;
 use crate::exit;
 use crate::junit::{Case, Junit, Outcome};
 
@@ -43,7 +44,7 @@ impl Findings {
         }
         let worst = self.all.iter().map(|finding| finding.verdict).max();
         if self.as_json {
-            terminal::json(&json!({ "rig": rig, "verdict": worst, "findings": self.all }))?;
+            document::FINDINGS.print(&json!({ "rig": rig, "verdict": worst, "findings": self.all }))?;
         }
         Ok(match worst {
             Some(Verdict::Fail) => exit::code(Status::Rig),

@@ -11,11 +11,13 @@ mod closing;
 mod conform;
 mod convert;
 mod doctor;
+mod document;
 mod errand;
 mod error;
 mod eval;
 mod exit;
 mod export;
+mod failure;
 mod findings;
 mod junit;
 mod manual;
@@ -27,6 +29,7 @@ mod queue;
 mod rebuilt;
 mod reconstruct;
 mod run;
+mod schema;
 mod screen;
 mod signals;
 mod study;
@@ -36,14 +39,14 @@ use std::process::ExitCode;
 
 use arms::{Arm, ArmAngle};
 use cli::{ArmName, Cli, Command, DaemonArguments, Output};
+use failure::Failure;
 use operator::OperatorCommand;
 use run::Task;
-use session::Status;
 use terminal::{LevelFilter, LogFormat};
 
 /// Runs the command line of this process and returns its exit code.
 pub fn main() -> ExitCode {
-    let cli: Cli = match terminal::arguments(|error| tell_machines(Status::Invalid, error)) {
+    let cli: Cli = match terminal::arguments(|error| Failure::of_arguments(error).tell_machines()) {
         Ok(cli) => cli,
         Err(code) => return code,
     };
@@ -56,21 +59,11 @@ pub fn main() -> ExitCode {
     match command(cli.command) {
         Ok(code) => code,
         Err(error) => {
-            let (status, text) = exit::failure(&error);
-            tell_machines(status, &text);
-            terminal::say(format_args!("gonioctl: {text}"));
+            let (failure, status) = Failure::of(&error);
+            failure.tell_machines();
+            terminal::say(format_args!("gonioctl: {}", failure.message()));
             exit::code(status)
         }
-    }
-}
-
-/// With `--json`, an error is an object on stdout too, on a line of its own, so that no reader of JSON gets nothing.
-fn tell_machines(status: Status, text: &str) {
-    let given = std::env::args_os().take_while(|argument| argument != "--");
-    if given.into_iter().any(|argument| argument == "--json") {
-        let object = serde_json::json!({ "error": text, "exit_status": status.code() });
-        // Nobody is left to tell where stdout is gone.
-        let _ = terminal::json_line(&object);
     }
 }
 
@@ -193,6 +186,7 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
                 None => campaign::campaign(captures, seed, wire, junit, output.json),
             });
         }
+        Command::Schema { name } => schema::schema(&name)?,
         Command::Completions { shell } => manual::completions(shell)?,
         Command::Man { directory } => manual::man(&directory)?,
         Command::Reconstruct { run, output } => return reconstruct::reconstruct(run, output.json),

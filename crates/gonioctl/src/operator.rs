@@ -5,6 +5,7 @@ use api::{Activity, ArmName, Client, Jog, What};
 use arms::{Arm, ArmAngle};
 use session::Status;
 
+use crate::document;
 use crate::error::CommandError;
 use crate::exit;
 
@@ -42,7 +43,7 @@ impl OperatorCommand {
         };
         terminal::say(said);
         if as_json {
-            terminal::json(&daemon.rig()?)?;
+            document::RIG_STATE.print(&daemon.rig()?)?;
         }
         Ok(ExitCode::SUCCESS)
     }
@@ -72,7 +73,7 @@ impl OperatorCommand {
             }
         }
         if as_json {
-            terminal::json(&rig)?;
+            document::RIG_STATE.print(&rig)?;
         }
         if let Some(fault) = rig.fault {
             terminal::say(format_args!("FAULT: {}", fault.text));

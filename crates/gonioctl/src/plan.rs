@@ -5,6 +5,7 @@ use serde_json::json;
 use session::RunRequest;
 use sweep::{Light, Plan, Sweep, Until};
 
+use crate::document;
 use crate::progress::clock;
 
 /// Says what a job would do; touches no hardware.
@@ -15,7 +16,7 @@ pub(crate) fn plan(job: &Path, rig: Option<&Path>, as_json: bool) -> anyhow::Res
     let order = RunRequest::read(job, rig)?;
     let plan = order.plan(None)?;
     if as_json {
-        terminal::json(&json!({
+        document::PLAN.print(&json!({
             "seconds": plan.seconds(),
             "overhead_s": plan.overhead_s,
             "closing_s": plan.closing_s,
@@ -43,7 +44,7 @@ pub(crate) fn hash(job: &Path, rig: Option<&Path>, as_json: bool) -> anyhow::Res
     let order = RunRequest::read(job, rig)?;
     let hash = order.hash(&order.plan(None)?, SystemTime::now())?;
     match as_json {
-        true => terminal::json(&json!({ "hash": hash }))?,
+        true => document::PLAN_HASH.print(&json!({ "hash": hash }))?,
         false => terminal::line(hash)?,
     }
     Ok(())

@@ -1,5 +1,7 @@
 use serde_json::json;
 
+use crate::document;
+
 /// Lists the serial ports of this machine.
 ///
 /// # Errors
@@ -7,7 +9,7 @@ use serde_json::json;
 pub(crate) fn ports(as_json: bool) -> anyhow::Result<()> {
     let ports = rig::ports()?;
     if as_json {
-        return Ok(terminal::json(&json!(ports))?);
+        return Ok(document::PORTS.print(&json!({ "ports": ports }))?);
     }
     if ports.is_empty() {
         terminal::say("no serial port here");

@@ -1,7 +1,9 @@
 use std::path::Path;
 
 use api::{Action, Client, Job, JobId, JobState, VerdictView};
+use serde_json::json;
 
+use crate::document;
 use crate::error::CommandError;
 
 /// Adds a job file to the queue; prints the job's id.
@@ -11,7 +13,7 @@ use crate::error::CommandError;
 pub(crate) fn submit(daemon: &Client, file: &Path, as_json: bool) -> anyhow::Result<()> {
     let job = hand_in(daemon, file)?;
     if as_json {
-        return Ok(terminal::json(&job)?);
+        return Ok(document::QUEUED.print(&job)?);
     }
     terminal::say(format_args!("{}: {}{}", job.specimen, job.state, advice(&job)));
     Ok(terminal::line(job.id)?)
@@ -35,7 +37,7 @@ pub(crate) fn jobs(daemon: &Client, all: bool, as_json: bool) -> anyhow::Result<
     let mut jobs = daemon.jobs()?;
     jobs.retain(|job| all || !job.state.over());
     if as_json {
-        return Ok(terminal::json(&jobs)?);
+        return Ok(document::QUEUE.print(&json!({ "jobs": jobs }))?);
     }
     if jobs.is_empty() {
         terminal::say("no job");
@@ -78,7 +80,7 @@ pub(crate) fn resume(daemon: &Client, job: Option<JobId>, as_json: bool) -> anyh
         daemon.act("/proceed")?;
         terminal::say("going on");
         if as_json {
-            terminal::json(&daemon.rig()?)?;
+            document::RIG_STATE.print(&daemon.rig()?)?;
         }
         return Ok(());
     }
@@ -102,7 +104,7 @@ pub(crate) fn cancel(daemon: &Client, job: JobId, as_json: bool) -> anyhow::Resu
 fn act(daemon: &Client, id: JobId, action: Action, as_json: bool) -> anyhow::Result<()> {
     let job = daemon.act_on_job(id, action)?;
     if as_json {
-        return Ok(terminal::json(&job)?);
+        return Ok(document::QUEUED.print(&job)?);
     }
     terminal::say(format_args!("{}: {}", job.specimen, job.state));
     Ok(())

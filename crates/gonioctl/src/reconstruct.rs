@@ -7,7 +7,8 @@ use report::RunDirectory;
 use serde_json::Value;
 use session::Status;
 
-use crate::{closing, exit};
+use crate::error::CommandError;
+use crate::{closing, document, exit};
 
 /// Makes everything in a run directory again: from the daemon's store where that knows the run, else from the
 /// directory's own journal. The exit code says whether the result can be used.
@@ -17,10 +18,9 @@ use crate::{closing, exit};
 pub(crate) fn reconstruct(run: PathBuf, as_json: bool) -> anyhow::Result<ExitCode> {
     let directory = RunDirectory::at(&run);
     let report = match from_store(&run) {
-        Some(Ok(Stored::Report(report))) => report,
-        Some(Ok(Stored::Refused(code))) => return Ok(code),
+        Some(Ok(report)) => report,
         // The journal in the directory may be older than the store, and is all that can be read then.
-        Some(Err(error)) if directory.journal().exists() => {
+        Some(Err(error)) if directory.journal().exists() && !error.is::<CommandError>() => {
             terminal::say(format_args!(
                 "{error:#}; the journal of the run directory is used"
             ));
@@ -34,7 +34,7 @@ pub(crate) fn reconstruct(run: PathBuf, as_json: bool) -> anyhow::Result<ExitCod
         false => Status::Done,
     };
     if as_json {
-        terminal::json(&report)?;
+        document::REPORT.print(&report)?;
         return Ok(exit::code(status));
     }
     let mut bad = Vec::new();
@@ -52,17 +52,9 @@ pub(crate) fn reconstruct(run: PathBuf, as_json: bool) -> anyhow::Result<ExitCod
     Ok(exit::code(status))
 }
 
-/// What the daemon's program made of its store.
-enum Stored {
-    /// report.json.
-    Report(Value),
-    /// It failed, with this exit code, and has said why.
-    Refused(ExitCode),
-}
-
 /// Has the daemon's program make the run directory from the store that lies beside `runs`: only that program reads it.
 /// `None`: there is no store, or it does not know the run.
-fn from_store(run: &Path) -> Option<anyhow::Result<Stored>> {
+fn from_store(run: &Path) -> Option<anyhow::Result<Value>> {
     let run = std::path::absolute(run).ok()?;
     let store = run.parent()?.parent()?.join("goniod.db");
     store
@@ -71,12 +63,12 @@ fn from_store(run: &Path) -> Option<anyhow::Result<Stored>> {
         .and_then(Result::transpose)
 }
 
-fn ask_goniod(run: &Path) -> anyhow::Result<Option<Stored>> {
+fn ask_goniod(run: &Path) -> anyhow::Result<Option<Value>> {
     let program = goniod();
     let output = Command::new(&program)
         .arg("--reconstruct")
         .arg(run)
-        .stderr(Stdio::inherit())
+        .stdin(Stdio::null())
         .output()
         .with_context(|| {
             format!(
@@ -85,13 +77,25 @@ fn ask_goniod(run: &Path) -> anyhow::Result<Option<Stored>> {
             )
         })?;
     if !output.status.success() {
-        let code = output.status.code().and_then(|code| u8::try_from(code).ok());
-        let code = code.unwrap_or(Status::Invalid.code());
-        return Ok(Some(Stored::Refused(ExitCode::from(code))));
+        let said = String::from_utf8_lossy(&output.stderr);
+        return Err(CommandError::Unbegun {
+            why: format!("{} cannot make the run again: {}", program.display(), said.trim()),
+            status: status(output.status.code()),
+        }
+        .into());
     }
     let report: Value = serde_json::from_slice(&output.stdout)
         .with_context(|| format!("{} is of another version", program.display()))?;
-    Ok((!report.is_null()).then_some(Stored::Report(report)))
+    Ok((!report.is_null()).then_some(report))
+}
+
+/// What a program of ours means by its exit code.
+fn status(code: Option<i32>) -> Status {
+    let all = [Status::Rig, Status::Stopped, Status::Daemon, Status::Unusable];
+    let meant = all
+        .into_iter()
+        .find(|status| Some(i32::from(status.code())) == code);
+    meant.unwrap_or(Status::Invalid)
 }
 
 /// The daemon's program: the one beside this program that is named as this one is, else the one on the search path.

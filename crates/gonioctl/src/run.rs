@@ -10,6 +10,7 @@ use tokio::sync::watch;
 
 use crate::cli::DaemonArguments;
 use crate::closing::Closing;
+use crate::document;
 use crate::errand::Errand;
 use crate::exit;
 use crate::progress::Progress;
@@ -53,7 +54,7 @@ pub(crate) fn run(task: &Task<'_>, daemon: &DaemonArguments, json: bool) -> anyh
     };
     let wall_s = begun.elapsed().as_secs_f64();
     if json {
-        terminal::json(&closing.summary(wall_s))?;
+        document::RUN.print(&closing.summary(wall_s))?;
     } else {
         closing.say(wall_s);
         terminal::line(closing.directory.display())?;

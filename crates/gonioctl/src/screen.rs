@@ -6,6 +6,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use terminal::Printable;
 
+use crate::document;
 use crate::progress::clock;
 
 /// Without a terminal, progress is printed at most so often.
@@ -50,7 +51,7 @@ impl Screen {
             _ if self.as_json => {
                 // A reader that went away ends us with the next event.
                 let _ = match serde_json::from_str::<Value>(&event.data) {
-                    Ok(data) => terminal::json_line(&data),
+                    Ok(data) => document::EVENT.print_line(&data),
                     Err(_) => terminal::line(&event.data),
                 };
             }
@@ -74,7 +75,7 @@ impl Screen {
     /// Shows how a job stands.
     pub(crate) fn job(&mut self, job: &Job) {
         if self.as_json {
-            let _ = terminal::json_line(&json!({ "event": "job", "job": job }));
+            let _ = document::EVENT.print_line(&json!({ "event": "job", "job": job }));
             return;
         }
         self.say(&job_line(job));
