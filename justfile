@@ -19,6 +19,10 @@ ci:
 bench:
     cargo bench -p pdv --bench model
 
-# A trial at full length, by hand: campaign, wire, kills, operator, floods, strangers, host or peer
+# What is handed out, in target/dist: Debian package, static programs, image, schemas, bill of materials, checksums
+dist:
+    packaging/dist
+
+# A trial at full length, by hand: campaign, wire, kills, operator, floods, strangers, host, peer or dist
 trials name:
     .ci/trials {{ name }}
