@@ -107,6 +107,15 @@ fn main() {
             black_box(planes.eval(*incident, *exitant));
         }
     });
+    let (lights, viewers): (Vec<[f64; 3]>, Vec<[f64; 3]>) = pairs
+        .iter()
+        .map(|(incident, exitant)| (incident.to_array(), exitant.to_array()))
+        .unzip();
+    let mut rgb = vec![[0.0; 3]; pairs.len()];
+    let together = seconds(&mut group, "model of planes, 1024 pairs at once", || {
+        planes.eval_all(black_box(&lights), black_box(&viewers), &mut rgb);
+        black_box(&rgb);
+    });
     let sampler = Sampler::new(&planes);
     let sampling = seconds(&mut group, "importance sample of planes, 1024 times", || {
         for (incident, exitant) in &pairs {
@@ -146,6 +155,7 @@ fn main() {
         ("three exp_m1", exponentials),
         ("separable", evaluation),
         ("planes (at most 60)", reciprocal),
+        ("planes, all pairs at once (at most half of one by one)", together),
         ("bivariate (at most 60)", table),
         ("importance sample (at most 150)", sampling),
         ("MERL lookup", lookup),

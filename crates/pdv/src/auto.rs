@@ -158,6 +158,10 @@ impl Brdf for Auto {
     fn eval(&self, incident: DVec3, exitant: DVec3) -> DVec3 {
         self.model.eval(incident, exitant)
     }
+
+    fn eval_all(&self, incident: &[[f64; 3]], exitant: &[[f64; 3]], rgb: &mut [[f64; 3]]) {
+        self.model.eval_all(incident, exitant, rgb);
+    }
 }
 
 impl Model for Auto {

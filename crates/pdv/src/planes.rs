@@ -6,7 +6,7 @@ use crate::model::Basis;
 use crate::surface::Surface;
 use crate::sweeps::Sweeps;
 use crate::table::Table;
-use crate::{Error, FactorTable, Model, Observation, Shape};
+use crate::{Error, FactorTable, Model, Observation, PlainTable, Shape};
 
 /// A reciprocal BRDF of one or more planes and an arc.
 ///
@@ -119,6 +119,24 @@ impl Planes {
         self.loss
     }
 
+    /// The numbers of the table that [`Brdf::eval`] reads.
+    ///
+    /// ```
+    /// # use pdv::Observation;
+    /// # let grey = brdf::Lambert::new(0.5).expect("0.5 is an albedo");
+    /// # let plane: Vec<_> = [-0.1, 0.0, 0.2].iter().filter_map(|&d| Observation::of(&grey, 0.5, d)).collect();
+    /// let model = pdv::Planes::from_observations(&[plane], &[])?;
+    /// let table = model.plain_table();
+    /// assert_eq!(table.logs.len(), 3 * table.columns * table.rows);
+    /// // A perfect diffuser is the same everywhere.
+    /// let half = (0.5 / std::f32::consts::PI).log2();
+    /// assert!(table.logs.iter().all(|log| (log - half).abs() < 1e-3));
+    /// # Ok::<(), pdv::Error>(())
+    /// ```
+    pub fn plain_table(&self) -> PlainTable<'_> {
+        self.table.plain()
+    }
+
     /// f32 numbers of the table, 4 bytes each.
     pub fn numbers(&self) -> usize {
         self.table.numbers()
@@ -153,6 +171,15 @@ impl Brdf for Planes {
             return DVec3::ZERO;
         }
         self.table.reflectance(incident, exitant)
+    }
+
+    fn eval_all(&self, incident: &[[f64; 3]], exitant: &[[f64; 3]], rgb: &mut [[f64; 3]]) {
+        assert_eq!(
+            (incident.len(), exitant.len()),
+            (rgb.len(), rgb.len()),
+            "one result a pair"
+        );
+        self.table.reflectances(incident, exitant, rgb);
     }
 }
 

@@ -37,6 +37,19 @@ pub struct Sample {
     pub pdf: f64,
 }
 
+/// What a [`Sampler`] holds for one zenith angle θ_o of the viewer, for whoever draws elsewhere, such as a renderer on a
+/// graphics card.
+///
+/// Row n of N stands at tan(θ_o/2) = n/(N − 1); ring m of M begins at d_p = (1 + sin θ_o)(m/M)⁴.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rings<'a> {
+    /// With what probability a ring is drawn; all together 1.
+    pub shares: &'a [f64],
+    /// Walker's alias table of them: of each ring, which are equally probable here, the share that is its own, and which
+    /// ring the rest is.
+    pub aliases: &'a [(f64, u8)],
+}
+
 /// The rings for one zenith angle: shares of 1, and Walker's alias table of them.
 #[derive(Clone, Debug, PartialEq)]
 struct Row {
@@ -70,6 +83,23 @@ impl Sampler {
         Self {
             rows: (0..ROWS).map(|n| Row::new(model, theta_o(n))).collect(),
         }
+    }
+
+    /// What is drawn from, ascending by the viewer's zenith angle.
+    ///
+    /// ```
+    /// # use pdv::Observation;
+    /// # let grey = brdf::Lambert::new(0.5).expect("0.5 is an albedo");
+    /// # let plane: Vec<_> = [-0.1, 0.0, 0.2].iter().filter_map(|&d| Observation::of(&grey, 0.5, d)).collect();
+    /// let sampler = pdv::Sampler::new(&pdv::Planes::from_observations(&[plane], &[])?);
+    /// assert!(sampler.rings().all(|rings| (rings.shares.iter().sum::<f64>() - 1.0).abs() < 1e-12));
+    /// # Ok::<(), pdv::Error>(())
+    /// ```
+    pub fn rings(&self) -> impl ExactSizeIterator<Item = Rings<'_>> {
+        self.rows.iter().map(|row| Rings {
+            shares: &row.shares,
+            aliases: &row.aliases,
+        })
     }
 
     /// The light for a viewer at a unit vector above the horizon and two even numbers of 0 … below 1; `None` where the

@@ -2,14 +2,15 @@ use std::f32::consts::LN_2;
 
 use glam::{DVec3, Vec3, Vec4, Vec4Swizzles};
 
+use crate::PlainTable;
 use crate::bisected::{Bisected, Pair, RISE};
 
 /// Nodes over the half angle.
-const COLUMNS: usize = 66;
+pub(crate) const COLUMNS: usize = 66;
 /// Nodes over the cosines.
-const ROWS: usize = 20;
+pub(crate) const ROWS: usize = 20;
 /// Numbers of a row.
-const STRIDE: usize = 3 * COLUMNS;
+pub(crate) const STRIDE: usize = 3 * COLUMNS;
 /// Half angles, rad, of which one is where a table begins to be logarithmic: whichever loses least.
 const KNEES: [f64; 6] = [1e-4, 1e-3, 4e-3, 1e-2, 2.5e-2, 6e-2];
 /// Pairs by which a table is judged.
@@ -34,19 +35,19 @@ pub(crate) const LOG_MAX: f32 = 120.0;
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Table {
     /// log₂ of RGB, θ_h fastest, and a number that is loaded and not used.
-    logs: Vec<f32>,
-    axis: Axis,
+    pub(crate) logs: Vec<f32>,
+    pub(crate) axis: Axis,
     /// 0 in a black channel, else 1, and a number that is not used.
-    light: Vec4,
+    pub(crate) light: Vec4,
 }
 
 /// The axis of half angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Axis {
+pub(crate) struct Axis {
     /// 1/k² for tan²(θ_h/2).
-    inverse: f32,
+    pub(crate) inverse: f32,
     /// Cells per unit of the last place.
-    cells: f32,
+    pub(crate) cells: f32,
 }
 
 impl Axis {
@@ -62,9 +63,13 @@ impl Axis {
     /// In cells from the mirror direction, 0 … [`COLUMNS`] − 1, of 1 + tan²(θ_h/2)/k².
     #[inline(always)]
     fn places(self, numbers: Vec4) -> Vec4 {
-        // Signed, for which the processor has an instruction.
-        let whole = |number: f32| number.to_bits().wrapping_sub(1_f32.to_bits()).cast_signed() as f32;
-        Vec4::from_array(numbers.to_array().map(whole)) * self.cells
+        Vec4::from_array(numbers.to_array().map(last_places)) * self.cells
+    }
+
+    /// The same of one number.
+    #[inline(always)]
+    pub(crate) fn place(self, number: f32) -> f32 {
+        last_places(number) * self.cells
     }
 
     /// tan²(θ_h/2) of a place.
@@ -219,7 +224,7 @@ impl Table {
 
     /// log₂ of RGB in the cell that begins at a number; the last lane means nothing.
     #[inline(always)]
-    fn at(&self, first: usize, across: f32, along: f32) -> Vec4 {
+    pub(crate) fn at(&self, first: usize, across: f32, along: f32) -> Vec4 {
         let corners = &self.logs[first..first + STRIDE + 7];
         // Two products at once are done sooner than a difference and its product.
         let row = |at: usize| {
@@ -244,11 +249,30 @@ impl Table {
         exp2(near + rise, self.light).truncate().as_dvec3()
     }
 
+    /// Its numbers as they are.
+    pub(crate) fn plain(&self) -> PlainTable<'_> {
+        PlainTable {
+            logs: &self.logs[..ROWS * STRIDE],
+            columns: COLUMNS,
+            rows: ROWS,
+            inverse: self.axis.inverse,
+            cells: self.axis.cells,
+            light: self.light.truncate().to_array().map(|light| light > 0.0),
+        }
+    }
+
     /// Numbers that it consists of.
     pub(crate) fn numbers(&self) -> usize {
         // The axis has two, the channels three.
         self.logs.len() + 5
     }
+}
+
+/// By how many units of the last place a number is above 1.
+#[inline(always)]
+fn last_places(number: f32) -> f32 {
+    // Signed, for which the processor has an instruction.
+    number.to_bits().wrapping_sub(1_f32.to_bits()).cast_signed() as f32
 }
 
 /// The pose of a place in cells.
@@ -265,19 +289,40 @@ fn pose(axis: Axis, column: f64, row: f64) -> Bisected {
 /// 2ˣ times a factor to 2e-7 of itself for |x| ≤ 126, in all lanes at once.
 #[inline(always)]
 pub(crate) fn exp2(x: Vec4, factor: Vec4) -> Vec4 {
-    /// Adding it leaves a whole number in the last bits, and the bias of an exponent.
-    const WHOLE: f32 = 12_582_912.0 + 127.0;
     let shifted = x + Vec4::splat(WHOLE);
     let t = x - (shifted - Vec4::splat(WHOLE));
     // Taylor of 2ᵗ for |t| ≤ 1/2, in pairs.
-    let pair = |low: f32, high: f32| Vec4::splat(low) + t * high;
+    let pair = |[low, high]: [f32; 2]| Vec4::splat(low) + t * high;
     let square = t * t;
-    let low = pair(1.0, LN_2) + square * pair(LN_2 * LN_2 / 2.0, LN_2 * LN_2 * LN_2 / 6.0);
-    let high = pair(0.009_618_129, 0.001_333_355_8) + square * 0.000_154_035_3;
+    let low = pair(TAYLOR[0]) + square * pair(TAYLOR[1]);
+    let high = pair(TAYLOR[2]) + square * LAST_OF_TAYLOR;
     let sum = low + square * square * high;
     let power = shifted.to_array().map(|s| f32::from_bits(s.to_bits() << 23));
     sum * (Vec4::from_array(power) * factor)
 }
+
+/// 2ˣ of one number, as [`exp2`] has it: what a loop over many is made of.
+#[inline(always)]
+pub(crate) fn two_to(x: f32) -> f32 {
+    let shifted = x + WHOLE;
+    let t = x - (shifted - WHOLE);
+    let pair = |[low, high]: [f32; 2]| low + t * high;
+    let square = t * t;
+    let low = pair(TAYLOR[0]) + square * pair(TAYLOR[1]);
+    let high = pair(TAYLOR[2]) + square * LAST_OF_TAYLOR;
+    let sum = low + square * square * high;
+    sum * f32::from_bits(shifted.to_bits() << 23)
+}
+
+/// Adding it leaves a whole number in the last bits, and the bias of an exponent.
+const WHOLE: f32 = 12_582_912.0 + 127.0;
+/// The coefficients of the Taylor series of 2ᵗ, in pairs.
+const TAYLOR: [[f32; 2]; 3] = [
+    [1.0, LN_2],
+    [LN_2 * LN_2 / 2.0, LN_2 * LN_2 * LN_2 / 6.0],
+    [0.009_618_129, 0.001_333_355_8],
+];
+const LAST_OF_TAYLOR: f32 = 0.000_154_035_3;
 
 /// log₂ of RGB as it is stored.
 pub(crate) fn logs(rgb: DVec3) -> Vec3 {
