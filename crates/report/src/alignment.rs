@@ -14,8 +14,9 @@ use crate::Measurement;
 const TURN: usize = 0;
 const LAG: usize = 1;
 const OF_SWEEPS: usize = 3;
-/// Half of a play is known to this share of it before a sweep tells more.
-const PLAY_KNOWN: f64 = 0.5;
+/// Standard uncertainty of how far an arm lags behind its encoder, as a share of half the play that its servo may have, before a
+/// lobe tells it: a servo may have less play than its manual says, and none is taken to be sure to have any.
+const PLAY_KNOWN: f64 = 0.85;
 /// An arm leans to one side of its play from this share of it on.
 const LEANS: f64 = 0.5;
 /// By how many times as much as the rig file says encoders may err, where the lobes of the sweeps disagree by that.
@@ -202,12 +203,11 @@ impl Prior {
     fn new(rig: &RigFile, zeros: ZeroUncertainty, unknowns: usize, encoders: f64) -> Self {
         let known = &rig.uncertainty;
         let encoder = (encoders * known.encoder_rad).powi(2);
-        let mut mean = DVector::zeros(unknowns);
+        let mean = DVector::zeros(unknowns);
         let mut variance = DVector::from_element(unknowns, encoder);
         variance[TURN] = zeros.half_sum_rad.powi(2) + known.tilt_rad.powi(2);
         for arm in Arm::BOTH {
             let half = known.play_rad[arm as usize] / 2.0;
-            mean[LAG + arm as usize] = half;
             variance[LAG + arm as usize] = (PLAY_KNOWN * half).powi(2);
         }
         Self { mean, variance }

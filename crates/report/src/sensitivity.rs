@@ -16,7 +16,7 @@ const STEP: f64 = 1e-3;
 /// that share a lobe is about as wide as the apertures, and what it was before cannot be told from its width any more.
 const MOST_LOST: f64 = 0.45;
 /// The largest change of ln f within the uncertainty of an angle that a slope is taken to tell.
-const STEEPEST: f64 = 1.0;
+const STEEPEST: f64 = 0.5;
 /// How many times of what the readings say was lost an interval must reach: of chrome, steel and brass, read by
 /// config/jobs/three-planes.toml, the apertures take 1.2 to 1.3 times as much of the peaks.
 const BEYOND: f64 = 1.5;

@@ -127,8 +127,8 @@ pub struct Uncertainties {
     pub stray_per_sr: f64,
     /// Of each arm's angle from one reading to the next, rad.
     pub angle_rad: [f64; 2],
-    /// Play between each arm and its encoder, rad of the arm; half of it, by which an arm lags behind its encoder, is known
-    /// to a half.
+    /// Play that there may be between each arm and its encoder, rad of the arm; an arm lags behind its encoder by half of
+    /// what there is.
     pub play_rad: [f64; 2],
     /// By how much an encoder errs where an arm stands for a sweep, rad.
     pub encoder_rad: f64,

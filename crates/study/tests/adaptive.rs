@@ -11,8 +11,13 @@ use sweep::Job;
 const FIRST: &str = "[[plane]]\ntheta_r_deg = 20\nreadings = 16\ndistribution = \"lobe\"\n[[plane]]\ntheta_r_deg = 70\n\
     readings = 16\ndistribution = \"lobe\"\n[arc]\nreadings = 8\n[reconstruction]\nmodel = \"planes\"\n";
 
+/// A rig whose file knows the play of its simulated gears.
+fn rig() -> RigFile {
+    RigFile::parse("[uncertainty]\nplay_deg = 0.02", "rig.toml".as_ref()).expect("a good rig file")
+}
+
 fn captured(material: &Fitted, rest: &str) -> Measured {
-    let rig = RigFile::parse(RigFile::BUILT_IN, "built-in".as_ref()).expect("a good rig file");
+    let rig = rig();
     let job = Job::parse(&format!("{FIRST}{rest}"), "job.toml").expect("a good job");
     measure(&job, &rig, Arc::new(*material)).expect("the rig can do it")
 }
@@ -90,7 +95,7 @@ fn more_time_buys_a_smaller_error() {
 /// What is added is as dense as what is there: a plane of fewer readings between denser ones would do harm.
 #[test]
 fn a_plane_that_is_added_has_as_many_readings_as_the_densest() {
-    let rig = RigFile::parse(RigFile::BUILT_IN, "built-in".as_ref()).expect("a good rig file");
+    let rig = rig();
     let mechanics = capture::mechanics(&rig, None);
     let text = FIRST.replacen("readings = 16", "readings = 40", 1);
     let job = Job::parse(&text, "job.toml").expect("a good job");

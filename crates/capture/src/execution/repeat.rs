@@ -2,15 +2,14 @@ use rig::{Counts, Rig};
 use sweep::Sweep;
 
 use super::{Execution, Interrupt, readings};
-use crate::exposure::sensitivity;
 use crate::{Event, Flag, Reading, Record};
 
-/// Among so many of the latest readings the faintest is measured again.
+/// So many of the latest readings are measured again: light from outside that flickers is missed by a short exposure now and
+/// then, and so it is by a choice of the faintest ones.
 const LATEST: usize = 8;
 
 impl<R: Rig> Execution<'_, R> {
-    /// Measures poses of the finished part again and records by how much they differ: the last one, and the faintest of
-    /// the last ones, where light from outside shows most.
+    /// Measures the last poses of the finished part again, the latest first, and records by how much they differ.
     pub(super) async fn repeat(&mut self) -> Result<(), Interrupt<R::Error>> {
         let references: Vec<Reading> = references(self.journal.records()).cloned().collect();
         if !references.is_empty() {
@@ -65,20 +64,8 @@ fn references(records: &[Record]) -> impl Iterator<Item = &Reading> {
         let poor = [Flag::Saturated, Flag::Dim];
         reading.accepted && reading.lamp && !reading.flags.iter().any(|flag| poor.contains(flag))
     };
-    let latest: Vec<&Reading> = readings(records).filter(sound).collect();
-    let latest = &latest[latest.len().saturating_sub(LATEST)..];
-    let last = latest.last().copied();
-    let faintest = latest
-        .iter()
-        .copied()
-        .min_by(|a, b| level(&a.counts).total_cmp(&level(&b.counts)));
-    let faintest = faintest.filter(|faintest| last.is_some_and(|last| last.step != faintest.step));
-    last.into_iter().chain(faintest)
-}
-
-/// Counts of the brightest channel by µs at gain ×1.
-fn level(counts: &Counts) -> f64 {
-    f64::from(counts.rgb.into_iter().fold(0, u32::max)) / sensitivity(counts.exposure)
+    let sound: Vec<&Reading> = readings(records).filter(sound).collect();
+    sound.into_iter().rev().take(LATEST)
 }
 
 /// Relative difference of the channel that was brightest, each relative to the lamp monitor.

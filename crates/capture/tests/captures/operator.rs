@@ -420,7 +420,7 @@ async fn a_stop_decelerates_on_the_profile_without_swinging_back() {
 }
 
 #[tokio::test(start_paused = true)]
-async fn a_resumed_run_tells_by_how_much_a_pose_differs_now() {
+async fn a_resumed_run_tells_by_how_much_the_last_poses_differ_now() {
     let sim = "specimen = \"lambert:0.5\"\nimperfections = \"none\"";
     let mut scene = Scene::new(SHORT, sim).await;
     let stop = after(30, &scene.control, Command::Finish);
@@ -437,22 +437,22 @@ async fn a_resumed_run_tells_by_how_much_a_pose_differs_now() {
         }
     });
     assert_eq!(outcome.await.unwrap(), Outcome::Done);
-    let [(step, sweep, difference_rel)] = told[..] else {
-        panic!("{told:?}");
-    };
-    assert_eq!((sweep, difference_rel), (sweep::Sweep::Repeat, 0.0));
+    assert!((1..=8).contains(&told.len()), "{told:?}");
     let accepted = scene.journal.accepted();
-    assert!(
-        accepted
-            .iter()
-            .any(|reading| reading.step == step && reading.lamp)
-    );
+    for &(step, sweep, difference_rel) in &told {
+        assert_eq!((sweep, difference_rel), (sweep::Sweep::Repeat, 0.0));
+        assert!(
+            accepted
+                .iter()
+                .any(|reading| reading.step == step && reading.lamp)
+        );
+    }
     let repeats = scene
         .journal
         .records
         .iter()
         .filter(|record| matches!(record, Record::Repeat { reading, .. } if reading.lamp));
-    assert_eq!(repeats.count(), 1, "and the journal has it");
+    assert_eq!(repeats.count(), told.len(), "and the journal has them");
     assert_complete(&scene.journal);
 }
 
