@@ -12,9 +12,13 @@ const SCENE: &str = "[scene]\ntheta_i_deg = [0, 60]\ntheta_o_deg = [0, 60]\n";
 /// A job that names no sweep.
 const OPEN: &str = "[reconstruction]\nmodel = \"planes\"\n";
 
-/// The built-in rig, and the pairs over which errors are means.
+/// A rig whose file knows how good its simulated arms are, and the pairs over which errors are means.
 fn bench() -> (RigFile, Draw) {
-    let rig = RigFile::parse(RigFile::BUILT_IN, "built-in".as_ref()).expect("a good rig file");
+    let rig = RigFile::parse(
+        "[uncertainty]\nplay_deg = 0.02\nencoder_deg = 0.0\ntilt_deg = 0.0",
+        "rig.toml".as_ref(),
+    )
+    .expect("a good rig file");
     let draw = Draw {
         pairs: 20_000,
         ..Draw::default()
