@@ -226,7 +226,7 @@ impl<'a> Ranging<'a> {
 }
 
 /// Integration time at gain ×1 that collects as much, µs.
-pub(crate) fn sensitivity(exposure: Exposure) -> f64 {
+fn sensitivity(exposure: Exposure) -> f64 {
     f64::from(exposure.integration_us) * exposure.gain.factor()
 }
 

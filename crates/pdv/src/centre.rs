@@ -92,12 +92,17 @@ impl Brdf for NarrowLobe {
         let half = sum.truncate().length().atan2(sum.z);
         // |ω_i − ω_o| = 2 sin θ_d and |ω_i + ω_o| = 2 cos θ_d.
         let difference = incident.distance(exitant).atan2(sum.length()) - std::f64::consts::FRAC_PI_4;
-        let height: f64 = (0..HEIGHTS)
-            .map(|power| self.heights[power] * difference.powi(power as i32))
-            .sum();
+        let height = height(self.heights, difference);
         let fall = (half / self.width_rad).powi(2).ln_1p();
         DVec3::splat((height - self.steepness * fall).exp() + self.ground.exp())
     }
+}
+
+/// ln of the height of a lobe at a difference angle, rad from π/4.
+fn height(heights: [f64; HEIGHTS], difference: f64) -> f64 {
+    (0..HEIGHTS)
+        .map(|power| heights[power] * difference.powi(power as i32))
+        .sum()
 }
 
 /// Where the lobe of each curve stands, told by all curves together.
@@ -320,16 +325,14 @@ impl Normal {
             .iter()
             .map(|point| point.ln_f)
             .fold(f64::INFINITY, f64::min);
+        let heights = std::array::from_fn(|power| at[curves + HEIGHT + power]);
         let mut slopes = DVector::zeros(n);
         for point in points {
             let x = (point.half - at[point.place]) / a;
             let fall = (x * x).ln_1p();
             let steep = 2.0 * b * x / (1.0 + x * x);
             slopes.fill(0.0);
-            let height: f64 = (0..HEIGHTS)
-                .map(|power| at[curves + HEIGHT + power] * point.difference.powi(power as i32))
-                .sum();
-            let lobe = height - b * fall;
+            let lobe = height(heights, point.difference) - b * fall;
             let ln_f = lobe.max(ground) + (-(lobe - ground).abs()).exp().ln_1p();
             // Which part of the light is the lobe's.
             let share = (lobe - ln_f).exp();

@@ -187,7 +187,6 @@ fn errors(sweeps: &[Sweep], sweep: Sweep, lean: [f64; 2]) -> [DVector<f64>; 2] {
 
 /// What is known of the unknowns before a lobe says more.
 struct Prior {
-    mean: DVector<f64>,
     variance: DVector<f64>,
 }
 
@@ -203,19 +202,18 @@ impl Prior {
     fn new(rig: &RigFile, zeros: ZeroUncertainty, unknowns: usize, encoders: f64) -> Self {
         let known = &rig.uncertainty;
         let encoder = (encoders * known.encoder_rad).powi(2);
-        let mean = DVector::zeros(unknowns);
         let mut variance = DVector::from_element(unknowns, encoder);
         variance[TURN] = zeros.half_sum_rad.powi(2) + known.tilt_rad.powi(2);
         for arm in Arm::BOTH {
             let half = known.play_rad[arm as usize] / 2.0;
             variance[LAG + arm as usize] = (PLAY_KNOWN * half).powi(2);
         }
-        Self { mean, variance }
+        Self { variance }
     }
 
     fn untold(self) -> Posterior {
         Posterior {
-            mean: self.mean,
+            mean: DVector::zeros(self.variance.len()),
             covariance: DMatrix::from_diagonal(&self.variance),
             likelihood: 0.0,
         }
@@ -228,16 +226,15 @@ impl Prior {
             seen.iter().map(|(_, centre)| centre.u_rad.powi(2).max(1e-18)),
         ));
         let says = DVector::from_iterator(seen.len(), seen.iter().map(|(_, centre)| centre.half_rad));
-        let off = says - rows * &self.mean;
         let spread = rows * &before * rows.transpose() + noise;
         let Some(spread) = spread.cholesky().filter(|_| !seen.is_empty()) else {
             return self.untold();
         };
         let gain = &before * rows.transpose() * spread.inverse();
-        let likelihood = -0.5 * off.dot(&spread.solve(&off)) - spread.l().diagonal().map(f64::ln).sum();
+        let likelihood = -0.5 * says.dot(&spread.solve(&says)) - spread.l().diagonal().map(f64::ln).sum();
         let covariance = &before - &gain * rows * &before;
         Posterior {
-            mean: &self.mean + &gain * off,
+            mean: &gain * says,
             covariance: (&covariance + covariance.transpose()) * 0.5,
             likelihood,
         }

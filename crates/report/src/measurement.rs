@@ -119,7 +119,19 @@ pub fn measurements(records: &[Record], rig: &RigFile) -> Vec<Measurement> {
     };
     let zeros = zeros(records, rig);
     let by_certificate = with(Alignment::none());
-    let mut measurements = with(Alignment::new(&by_certificate, rig, zeros));
+    let alignment = Alignment::new(&by_certificate, rig, zeros);
+    let mut measurements = match alignment.told.is_empty() {
+        false => with(alignment),
+        // Nothing is corrected, so that nothing need be reduced again.
+        true => {
+            let alignment = Arc::new(alignment);
+            let known = |m: Measurement| Measurement {
+                alignment: alignment.clone(),
+                ..m
+            };
+            by_certificate.into_iter().map(known).collect()
+        }
+    };
     sharpen(&mut measurements, records);
     expand(&mut measurements, zeros, rig);
     measurements

@@ -155,6 +155,11 @@ impl Source<'_> {
     }
 }
 
+/// A number, whole or not, as TOML may spell either.
+pub(super) fn number(value: &toml::Value) -> Option<f64> {
+    value.as_float().or(value.as_integer().map(|whole| whole as f64))
+}
+
 /// Marks every value of the built-in file as such.
 fn unplace(table: &mut DeTable<'_>) {
     for (_, value) in table.iter_mut() {

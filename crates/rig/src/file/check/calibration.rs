@@ -7,7 +7,7 @@ use arms::{ArmAngle, Envelope, Pose};
 use toml::Spanned;
 
 use crate::file::raw::{RawCalibration, RawUncertainty};
-use crate::file::source::Source;
+use crate::file::source::{Source, number};
 use crate::file::{ArmSettings, Certificates, Uncertainties, Visits};
 use crate::{Calibration, Filling, Lamp, RigError};
 
@@ -140,17 +140,17 @@ fn of_arms(
     of_servo_deg: impl Fn(&ArmSettings) -> f64,
 ) -> Result<[f64; 2], RigError> {
     let key = format!("uncertainty.{key}");
-    let whole = |value: &toml::Value| value.as_integer().map(|whole| whole as f64);
-    match value.get_ref() {
-        toml::Value::String(word) if word == "model" => Ok(arms.map(|arm| of_servo_deg(arm).to_radians())),
-        number if number.is_float() || number.is_integer() => {
-            let deg = number.as_float().or(whole(number)).unwrap_or(f64::NAN);
+    if value.get_ref().as_str() == Some("model") {
+        return Ok(arms.map(|arm| of_servo_deg(arm).to_radians()));
+    }
+    match number(value.get_ref()) {
+        Some(deg) => {
             let deg = source.within(&key, &Spanned::new(value.span(), deg), 0.0..=max_deg)?;
             Ok([deg.to_radians(); 2])
         }
-        other => {
+        None => {
             let allowed = format!("\"model\", or degrees for both arms, 0 … {max_deg}");
-            Err(source.refuse(&key, value, other, allowed))
+            Err(source.refuse(&key, value, value.get_ref(), allowed))
         }
     }
 }

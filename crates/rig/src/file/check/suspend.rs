@@ -4,7 +4,7 @@ use toml::Spanned;
 
 use crate::dynamixel::Model;
 use crate::file::raw::RawSuspend;
-use crate::file::source::Source;
+use crate::file::source::{Source, number};
 use crate::{Band, RigError, Suspend};
 
 /// `[suspend]`
@@ -33,7 +33,6 @@ fn supply(
     models: [&Model; 2],
 ) -> Result<[Option<Band>; 2], RigError> {
     const KEY: &str = "suspend.supply_v";
-    let number = |value: &toml::Value| value.as_float().or(value.as_integer().map(|whole| whole as f64));
     match value.get_ref() {
         toml::Value::String(word) if word == "model" => Ok(models.map(|model| {
             let [hold, release] = model.supply_bounds_v();
