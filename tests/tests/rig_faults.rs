@@ -102,7 +102,7 @@ async fn a_broken_bus_costs_retries_and_nothing_else() {
         ("", |faults| faults.noise = 0.2),
         ("", |faults| faults.duplicate_reply = 0.2),
         ("", |faults| faults.wrong_id = 0.1),
-        // The crate panics at such a length in a debug build.
+        // The crate would panic at such a length in a debug build.
         ("", |faults| faults.wrong_length = 0.1),
         ("", |faults| {
             faults.late_reply = 0.1;

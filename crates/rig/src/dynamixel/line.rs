@@ -1,6 +1,5 @@
 use std::collections::BTreeSet;
 use std::io;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -105,7 +104,7 @@ pub(super) struct Line {
     /// Id of the device whose status packet came last.
     sender: Arc<AtomicU8>,
     echo: Option<serial2::SerialPort>,
-    lock: TTYPort,
+    _lock: TTYPort,
     path: PathBuf,
     settings: BusSettings,
     /// After a failure nothing is sent before this: a late reply shall not collide with the next request.
@@ -128,7 +127,7 @@ impl Line {
             bus: bus(&lock, &sender).map_err(unusable)?,
             sender,
             echo: echo(&lock, settings).map_err(unusable)?,
-            lock,
+            _lock: lock,
             path: path.to_owned(),
             settings: settings.clone(),
             quiet_until: None,
@@ -138,25 +137,12 @@ impl Line {
     }
 
     /// Sends a packet and collects its replies.
-    ///
-    /// `dynamixel2` 0.9.1 panics on a reply that claims to be shorter than a status packet can be (its length field below
-    /// 4); such a reply is damage like any other, and the crate's state is made anew.
     pub(super) fn transact(&mut self, request: &Request) -> Result<Vec<Reply>, Failure> {
         if let Some(quiet) = self.quiet_until.take() {
             std::thread::sleep(quiet.saturating_duration_since(Instant::now()));
         }
-        let first = request.replies.first().map_or(request.id, |&(id, _)| id);
         let started = Instant::now();
-        let result = catch_unwind(AssertUnwindSafe(|| self.attempt(request))).unwrap_or_else(|_| {
-            let cause = match bus(&self.lock, &self.sender) {
-                Ok(bus) => {
-                    self.bus = bus;
-                    Cause::Damage("it has an impossible length".to_owned())
-                }
-                Err(error) => Cause::Gone(error.into()),
-            };
-            Err(Failure { id: first, cause })
-        });
+        let result = self.attempt(request);
         if let Err(Failure { id, cause }) = &result {
             tracing::debug!(id, ?cause, port = %self.path.display(), "transaction failed");
             if matches!(cause, Cause::Silence | Cause::Damage(_)) {
@@ -256,18 +242,13 @@ impl Line {
         let deadline = Instant::now() + ALL_ANSWERED + DEVICES * answer;
         let (mut answers, mut damaged) = (Answers::new(), 0);
         while damaged < DAMAGED_MAX {
-            // The crate panics on an impossible length, see `transact`.
-            match catch_unwind(AssertUnwindSafe(|| self.receive(deadline))) {
-                Ok(Ok((id, Ok(reply)))) if reply.parameters.len() == PING_REPLY => {
+            match self.receive(deadline) {
+                Ok((id, Ok(reply))) if reply.parameters.len() == PING_REPLY => {
                     answers.push((id, reply.parameters));
                 }
-                Ok(Err(Cause::Silence)) => break,
-                Ok(Err(cause @ Cause::Gone(_))) => return Err(cause),
-                Ok(_) => damaged += 1,
-                Err(_) => {
-                    damaged += 1;
-                    break;
-                }
+                Err(Cause::Silence) => break,
+                Err(cause @ Cause::Gone(_)) => return Err(cause),
+                _ => damaged += 1,
             }
         }
         Ok((answers, damaged))
@@ -316,6 +297,7 @@ impl Line {
                 Ok((self.sender.load(Ordering::Relaxed), Err(error.error_number())))
             }
             Err(ReadError::Io(error)) => Err(io_cause(error)),
+            Err(ReadError::BufferFull(_)) => Err(Cause::Damage("it has an impossible length".to_owned())),
             Err(error) => Err(Cause::Damage(error.to_string())),
         }
     }
