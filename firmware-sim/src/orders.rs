@@ -144,7 +144,8 @@ mod tests {
 
     #[test]
     fn the_mechanics_of_one_arm_change_while_it_runs() {
-        let mut rig = RigFile::default();
+        let text = "[sim]\nimperfections = \"none\"";
+        let mut rig = RigFile::parse(text, "rig.toml".as_ref()).unwrap();
         let mut server = Server::start(&rig).unwrap();
         obey("sim.light.gravity_counts = 8", &mut rig, &mut server).unwrap();
         let order = "sim = { light = { sag_deg_per_s = 30 }, sensor = { sag_deg_per_s = 5 } }";

@@ -24,6 +24,7 @@ pub fn mechanics(rig: &RigFile, start: Option<Pose>) -> Mechanics {
         },
         overshoot_rad: rig.motion.overshoot_rad,
         settle_s: rig.motion.settle.as_secs_f64(),
+        late_s: rig.motion.late.as_secs_f64(),
         integration_us: [
             rig.photometer.integration_min_us,
             rig.photometer.integration_max_us,

@@ -69,7 +69,8 @@ pub trait Actuator: Send {
     /// No reply.
     fn location(&mut self) -> impl Future<Output = Result<Location, Self::Error>> + Send;
 
-    /// Decelerates on the profile: the goal becomes present position ± v²/2a in the direction of motion.
+    /// Decelerates on the profile: the goal becomes present position ± v²/2a in the direction of motion. An arm that stands
+    /// keeps its goal.
     ///
     /// # Errors
     /// No reply, refusal.

@@ -18,6 +18,7 @@ mod travel;
 pub use error::DriveError;
 pub use hindrance::Hindrance;
 use pulse::Pulse;
+use rest::Looks;
 pub use rest::Rest;
 
 /// Longest wait between two looks at a rig that is engaged or lit: soon enough to stop the other arm when one fails.
@@ -146,12 +147,17 @@ impl<R: Rig> Drive<R> {
     /// photometer that never ends is left to its next trigger, which it refuses.
     pub async fn rest(&mut self) -> Result<(), DriveError<R::Error>> {
         let begun = self.waited;
+        let mut looks = Looks::default();
         loop {
             let snapshot = self.snapshot().await?;
             let after = self.waited - begun;
+            looks.push(after, snapshot.pose());
+            // An arm that trembles or hunts turns as fast as one that goes somewhere.
+            let drift_rad = looks.drift_rad(travel::TREND).unwrap_or([f64::INFINITY; 2]);
+            let goes = |arm: Arm| drift_rad[arm as usize].abs() > self.file.arm(arm).axis.resolution_rad();
             let moving = Arm::BOTH
                 .into_iter()
-                .find(|&arm| snapshot.arms[arm as usize].moving);
+                .find(|&arm| snapshot.arms[arm as usize].moving && goes(arm));
             if let Some(arm) = moving {
                 self.check_resting(arm, &snapshot, after)?;
             } else {

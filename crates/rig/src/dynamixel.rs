@@ -3,6 +3,7 @@
 //! Built on `dynamixel2` with defences; docs/adr/0001-dynamixel2-with-defences.md says which and why.
 
 mod block;
+mod braking;
 mod buffer;
 mod bus;
 mod census;
@@ -15,6 +16,7 @@ pub mod register;
 mod rig;
 mod servo;
 
+pub use braking::Braking;
 pub use census::{Census, Heard};
 pub use model::{Indirect, MODELS, Model, Series};
 pub use photometer::Photometer;

@@ -199,6 +199,8 @@ pub struct MotionSettings {
     pub still_rad: f64,
     /// How long an arm must have stood still before a reading.
     pub settle: Duration,
+    /// How much later than its profile says an arm is expected to stand: what plans count with. A run measures it.
+    pub late: Duration,
     /// By how much a motion may overrun its profile.
     pub timeout: Duration,
     /// Direction of the last approach.

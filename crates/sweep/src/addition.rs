@@ -1,12 +1,14 @@
+use std::collections::HashSet;
+
 use arms::{Arm, ArmAngle, Pose};
 use pdv::Distribution;
 
 use crate::order::order;
-use crate::planner::Draft;
+use crate::planner::{Draft, may_fly};
 use crate::reach::Reach;
 use crate::route::Standing;
 use crate::targets::{Targets, plane};
-use crate::{Job, Mechanics, Plan, Plane, Step, Sweep, SweepError, unread};
+use crate::{Job, Mechanics, Mode, Plan, Plane, Step, Sweep, SweepError, unread};
 
 /// What may be added to a plan while it runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,11 +55,22 @@ pub fn add(
     if targets.poses.is_empty() {
         return Ok(Vec::new());
     }
+    let flown = job.mode == Mode::Fly && may_fly(mechanics, &mut targets);
     let poses = targets.poses.clone();
-    let backwards = order(mechanics, Some(standing), std::slice::from_ref(&poses), &[false])[0].1;
+    let returns = flown && job.passes == 2;
+    let backwards = order(
+        mechanics,
+        Some(standing),
+        std::slice::from_ref(&poses),
+        &[returns],
+    )[0]
+    .1;
     let mut draft = Draft::after(mechanics, standing, &plan.steps);
     let along = (0..poses.len()).map(|i| poses[if backwards { poses.len() - 1 - i } else { i }]);
-    draft.sweep(&job.name, &mut targets, along)?;
+    match flown {
+        true => draft.fly(job, &mut targets, along.collect())?,
+        false => draft.sweep(&job.name, &mut targets, along)?,
+    }
     draft.visit_reference(&job.name)?;
     draft.added(&plan.steps, standing.pose)
 }
@@ -124,7 +137,11 @@ impl Job {
     }
 }
 
-/// Readings that a plan has of a sweep.
+/// Poses that a plan has of a sweep: a flight may pass each of them twice.
 fn planned(plan: &Plan, sweep: Sweep) -> usize {
-    plan.steps.iter().filter(|step| step.sweep == sweep).count()
+    let steps = plan.steps.iter().filter(|step| step.sweep == sweep);
+    let poses: HashSet<[u64; 2]> = steps
+        .map(|step| [step.pose().light, step.pose().sensor].map(|angle| angle.rad().to_bits()))
+        .collect();
+    poses.len()
 }

@@ -194,6 +194,7 @@ impl Job {
             planes,
             arc,
             mode: raw.sweep.as_ref().map_or(Mode::Step, |sweep| sweep.mode),
+            passes: raw.sweep.as_ref().map_or(Ok(1), |sweep| sweep.passes(&source))?,
             model: raw.reconstruction.model,
             scene,
             until,

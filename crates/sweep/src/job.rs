@@ -16,6 +16,8 @@ pub struct Job {
     pub arc: Option<Arc>,
     /// How the arms take the readings.
     pub mode: Mode,
+    /// How often each sweep is passed: 1, or in flight also 2, there and back.
+    pub passes: usize,
     /// How the BRDF is made of the readings.
     pub model: Model,
     /// What will be looked at; `None`: everything.
@@ -41,7 +43,7 @@ pub enum Mode {
     /// They stand still for each.
     #[default]
     Step,
-    /// They fly through all of them, there and back.
+    /// They fly through all of them.
     Fly,
 }
 

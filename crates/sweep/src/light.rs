@@ -53,7 +53,7 @@ impl Light {
             if step.exposure.is_none() {
                 light.readings += 1;
                 light.worst_s += match step.pass {
-                    Some(_) => often_s + mechanics.settle_s + way_s(mechanics, from, step.pose()),
+                    Some(_) => often_s + mechanics.rest_s() + way_s(mechanics, from, step.pose()),
                     None => often_s - light.again_s,
                 };
             }

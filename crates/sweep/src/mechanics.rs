@@ -22,6 +22,9 @@ pub struct Mechanics {
     pub overshoot_rad: f64,
     /// Settling before each reading, s.
     pub settle_s: f64,
+    /// How much later than its profile says an arm is expected to stand, s.
+    #[serde(default)]
+    pub late_s: f64,
     /// Shortest and longest integration, µs.
     pub integration_us: [u32; 2],
     /// Most exposures of one reading.
@@ -42,6 +45,11 @@ pub struct Mechanics {
 }
 
 impl Mechanics {
+    /// Seconds from the end of a motion's profile to a reading.
+    pub(crate) fn rest_s(&self) -> f64 {
+        self.late_s + self.settle_s
+    }
+
     /// Whole steps of an arm from its grid angle, not rounded.
     pub(crate) fn steps(&self, arm: Arm, angle: ArmAngle) -> f64 {
         (angle.rad() - self.grid_rad[arm as usize]) / self.resolution_rad[arm as usize]

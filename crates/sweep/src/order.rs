@@ -146,6 +146,7 @@ mod tests {
             approach,
             overshoot_rad: 0.02,
             settle_s: 0.0,
+            late_s: 0.0,
             integration_us: [100, 1000],
             exposures: 9,
             transaction_s: 0.0,

@@ -21,9 +21,9 @@ const DARK_REPEATS: usize = 4;
 /// time of motion from where the arms stand. Angles are whole steps of the servos. Of a job with a scene, readings that no
 /// value in it is made of are left out.
 ///
-/// In flight each sweep is passed there and back, every pose a step of both, so that what play and lateness add in one
-/// direction the other takes away. The first dark readings are taken on the way to it. A sweep whose arms would not move
-/// alike is stepped, and the plan says so.
+/// In flight each sweep is passed once, or there and back where the job says so; then every pose is a step of both passes, and
+/// what play and lateness add in one direction the other takes away. The first dark readings are taken on the way to it. A sweep
+/// whose arms would not move alike is stepped, and the plan says so.
 ///
 /// # Errors
 /// The arms stand outside the envelope; a sweep of which nothing can be measured on this rig, with its key and why; a
@@ -77,7 +77,8 @@ fn lay(
         .iter()
         .map(|&i| job.mode == Mode::Fly && may_fly(mechanics, &mut sweeps[i]))
         .collect();
-    let order = order(mechanics, start, &poses, &flown);
+    let returns: Vec<bool> = flown.iter().map(|&flown| flown && job.passes == 2).collect();
+    let order = order(mechanics, start, &poses, &returns);
     let first = order.first().map(|&(i, backwards)| {
         let pose = poses[i][if backwards { poses[i].len() - 1 } else { 0 }];
         Standing {
@@ -109,7 +110,7 @@ fn lay(
         }
         let sweep = &mut sweeps[measured[i]];
         match flown[i] {
-            true => draft.fly(&job.name, sweep, along)?,
+            true => draft.fly(job, sweep, along)?,
             false => draft.sweep(&job.name, sweep, along.into_iter())?,
         }
     }
@@ -130,7 +131,7 @@ fn lay(
 }
 
 /// Whether a sweep can be flown. What it leaves out says where not, and else what flying costs.
-fn may_fly(mechanics: &Mechanics, sweep: &mut Targets) -> bool {
+pub(crate) fn may_fly(mechanics: &Mechanics, sweep: &mut Targets) -> bool {
     let may = pass(mechanics, &sweep.poses).is_some();
     let (what, why) = match may {
         true => (
@@ -252,6 +253,11 @@ impl<'a> Draft<'a> {
         };
         Self {
             dark_sets: 1,
+            passes: steps
+                .iter()
+                .filter_map(|step| step.pass)
+                .max()
+                .map_or(0, |last| last + 1),
             since_dark_s: since(Sweep::Dark),
             since_visit_s: since(Sweep::Reference),
             ..Self::new(mechanics, standing)
@@ -299,7 +305,7 @@ impl<'a> Draft<'a> {
         let Some(route) = route(self.mechanics, self.standing, pose) else {
             return false;
         };
-        let seconds = route.seconds + self.mechanics.settle_s + integration_s + self.mechanics.transaction_s;
+        let seconds = route.seconds + self.mechanics.rest_s() + integration_s + self.mechanics.transaction_s;
         self.push(sweep, route.path, exposure, None, seconds);
         self.standing = Standing {
             pose,
@@ -381,10 +387,16 @@ impl<'a> Draft<'a> {
         Ok(())
     }
 
-    /// A sweep in flight, there and back; left out where no safe way leads to it.
-    fn fly(&mut self, job: &str, targets: &mut Targets, mut poses: Vec<Pose>) -> Result<(), SweepError> {
-        for first in [true, false] {
-            self.upkeep(job)?;
+    /// A sweep in flight, once or there and back; left out where no safe way leads to it.
+    pub(crate) fn fly(
+        &mut self,
+        job: &Job,
+        targets: &mut Targets,
+        mut poses: Vec<Pose>,
+    ) -> Result<(), SweepError> {
+        for pass in 0..job.passes {
+            let first = pass == 0;
+            self.upkeep(&job.name)?;
             let way = route(self.mechanics, self.standing, poses[0]);
             let (Some(route), Some(seconds)) = (way, self.pass_s(&poses, first)) else {
                 targets.left_out.push(LeftOut {
@@ -396,7 +408,7 @@ impl<'a> Draft<'a> {
                 continue;
             };
             let mut path = route.path;
-            let mut to_first_s = route.seconds + self.mechanics.settle_s;
+            let mut to_first_s = route.seconds + self.mechanics.rest_s();
             for (&pose, seconds) in poses.iter().zip(seconds) {
                 let path = match std::mem::take(&mut path) {
                     way if way.is_empty() => vec![pose],
@@ -428,7 +440,7 @@ impl<'a> Draft<'a> {
             &flown[..],
         ]
         .concat();
-        seconds[1] += self.mechanics.leg_s(poses[0], poses[1]) + self.mechanics.settle_s;
+        seconds[1] += self.mechanics.leg_s(poses[0], poses[1]) + self.mechanics.rest_s();
         Some(seconds)
     }
 

@@ -1,6 +1,8 @@
+use std::time::Duration;
+
 use arms::{Arm, ArmAngle, Profile};
-use rig::dynamixel::Model;
 use rig::dynamixel::register::{Register, common, servo};
+use rig::dynamixel::{Braking, Model};
 use rig::{Actuator, ArmSettings, Device, Estop, Identity, Location, MotionSettings, RigFile};
 
 use super::{InProcessError, SharedBench};
@@ -167,27 +169,19 @@ impl Actuator for InProcessAxis {
             // It stands already, and takes no goal.
             return Ok(());
         }
-        let present = self.read(servo::PRESENT_POSITION)? as f64;
-        let velocity = self.read(servo::PRESENT_VELOCITY)?;
-        let acceleration = self.read(servo::PROFILE_ACCELERATION)?;
-        let units = self.arm.axis.units;
-        let [v, a] = [
-            velocity as f64 * units.velocity_rad_s,
-            acceleration as f64 * units.acceleration_rad_s2,
-        ];
-        let way = match acceleration {
-            0 => 0.0,
-            _ => units.counts(v * v.abs() / (2.0 * a)),
+        let register = |register| Ok::<_, InProcessError>(self.read(register)? as i32);
+        let braking = Braking {
+            acceleration: register(servo::PROFILE_ACCELERATION)?,
+            goal: register(servo::GOAL_POSITION)?,
+            velocity: register(servo::PRESENT_VELOCITY)?,
+            position: register(servo::PRESENT_POSITION)?,
+            velocity_trajectory: register(servo::VELOCITY_TRAJECTORY)?,
+            position_trajectory: register(servo::POSITION_TRAJECTORY)?,
         };
-        // Braking must not lead beyond where the arm was going, out of the limits, nor back.
-        let heading = self.read(servo::GOAL_POSITION)? as f64 - present;
-        let way = match heading * v > 0.0 {
-            true => way.abs().min(heading.abs()).copysign(v),
-            false => way,
-        };
-        let [low, high] = self.range.map(f64::round);
-        let goal = (present + way).clamp(low.min(present), high.max(present));
-        self.write(servo::GOAL_POSITION, goal.round() as i64)
+        match braking.rest(&self.arm.axis, self.range, Duration::ZERO) {
+            Some(goal) => self.write(servo::GOAL_POSITION, goal.into()),
+            None => Ok(()),
+        }
     }
 
     async fn halt(&mut self) -> Result<(), InProcessError> {

@@ -4,8 +4,8 @@ use rig::{Exposure, Gain, RigFile};
 /// known, and cannot wait to expose again.
 const HEADROOM: f64 = 1.0 / 16.0;
 
-/// Readings of each pose in flight, there and back: together they collect as much as the longest exposure at rest.
-const PASSES: f64 = 2.0;
+/// How many exposures in flight are as long as the longest at rest: what needs more light than one is better read at rest.
+const LONGEST: f64 = 2.0;
 
 /// The shortest exposure that is as little noisy as the rig file asks of a reading in flight, in its brightest channel and
 /// in the lamp monitor together; at most `longest_s`, where that is noisier.
@@ -15,7 +15,7 @@ const PASSES: f64 = 2.0;
 pub(crate) fn brief(file: &RigFile, rate: f64, longest_s: f64) -> Exposure {
     let p = &file.photometer;
     let shortest = f64::from(p.integration_min_us);
-    let longest = (f64::from(p.integration_max_us) / PASSES).max(shortest);
+    let longest = (f64::from(p.integration_max_us) / LONGEST).max(shortest);
     let at = |gain: Gain| {
         let bright_us = p.aim * f64::from(p.full_scale) / (rate * gain.factor());
         let needed_us = needed_us(file, rate, gain).min(bright_us).min(longest_s * 1e6);
@@ -66,7 +66,7 @@ mod tests {
             let both = noise(rate * us * gain, gain).hypot(noise(file.calibration.monitor * us, 1.0));
             let allowed = file.photometer.flight_noise_rel;
             println!("{rate} counts/µs: {exposure:?}, noise {:.3} %", both * 100.0);
-            if us < f64::from(file.photometer.integration_max_us) / PASSES {
+            if us < f64::from(file.photometer.integration_max_us) / LONGEST {
                 assert!(both <= 1.01 * allowed, "{rate} counts/µs: {both}");
             }
             assert!(

@@ -102,6 +102,9 @@ struct SweepTable {
     /// Whether the arms stop for each reading.
     #[serde(default)]
     mode: ModeName,
+    /// How often a flight passes each sweep.
+    #[schema(minimum = 1, maximum = 2)]
+    passes: Option<u8>,
     /// Error that is good enough, MALE.
     #[schema(minimum = 0.00001, maximum = 1)]
     target_male: Option<f64>,

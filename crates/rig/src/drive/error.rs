@@ -25,9 +25,9 @@ pub enum DriveError<E: Fault> {
     /// The motion would leave the envelope; nothing moved.
     #[error("motion refused")]
     Envelope(#[source] Violation),
-    /// An arm never took its goal.
+    /// An arm never took its goal, or lost it.
     #[error(
-        "{arm} arm did not take the goal {:.3}° within {:.1} s, it has {:.3}° (bus watchdog tripped, or another program on the bus?)",
+        "{arm} arm did not take or keep the goal {:.3}° within {:.1} s, it has {:.3}° (bus watchdog tripped, or another program on the bus?)",
         .goal.deg(), .tried.as_secs_f64(), .has.deg()
     )]
     GoalNotTaken {

@@ -15,9 +15,13 @@ const LOOKS: u32 = 5;
 const LATEST: Duration = Duration::from_millis(200);
 /// What stands for so long does not swing: more than half a period of a swing of 6 Hz.
 const SWING: Duration = Duration::from_millis(90);
-/// An arm that is off its goal by up to this many times what is near enough is sent on by as much, and so often.
+/// An arm that is off its goal by up to this, degrees, or this many times what is near enough, is sent on by as much, and
+/// so often: three counts of friction, eight of a load and some more.
+const TRIMMABLE_DEG: f64 = 2.0;
 const TRIMMABLE: f64 = 4.0;
 const TRIMS: usize = 3;
+/// Where an arm cannot be sent on, since its limits or the other arm are there, this many times what is near enough is.
+const AT_THE_EDGE: f64 = 2.0;
 /// How much of what a goal was moved by counts for the next one.
 const KEPT: f64 = 0.6;
 /// A change of its goal that moves an arm by less than this share was ignored.
@@ -27,7 +31,7 @@ const IGNORED: f64 = 0.25;
 const HUNT: Duration = Duration::from_millis(200);
 const HUNTING: f64 = 2.0;
 /// Over this time an arm that never came to rest shows whether it went anywhere: whole periods of a slow hunt in each half.
-const TREND: Duration = Duration::from_millis(800);
+pub(super) const TREND: Duration = Duration::from_millis(800);
 /// An arm that is near at the first look is looked at this much sooner the next time.
 const SOONER: f64 = 0.7;
 /// How much more than last time an arm may tremble without being waited for.
@@ -197,8 +201,12 @@ impl<R: Rig> Drive<R> {
             };
             let trimmed = self.trimmed(aim, rest.pose, goal);
             let from = self.snapshot().await?;
-            if trim == TRIMS || self.check(&from, trimmed).is_err() {
-                return Err(self.not_arrived(arm, goal, rest.pose, watch, hindrance));
+            let room = self.check(&from, trimmed).is_ok();
+            if !room && self.off(arm, rest.pose, goal) <= AT_THE_EDGE * self.file.motion.near_rad {
+                return Ok(rest);
+            }
+            if trim == TRIMS || !room {
+                return Err(self.not_arrived(arm, (goal, aim), rest.pose, watch, hindrance));
             }
             (start, aim) = (rest.pose, trimmed);
         }
@@ -272,7 +280,12 @@ impl<R: Rig> Drive<R> {
                 let trimmed = self.trimmed(aim, rest.pose, goal);
                 let room = self.file.envelope.check_pose(trimmed).is_ok();
                 let worst = off[0].max(off[1]);
-                if room && worst > near_rad && worst <= TRIMMABLE * near_rad {
+                let allowed = if room {
+                    self.trimmable_rad()
+                } else {
+                    AT_THE_EDGE * near_rad
+                };
+                if worst > near_rad && worst <= allowed {
                     return Ok(rest);
                 }
             }
@@ -291,7 +304,7 @@ impl<R: Rig> Drive<R> {
                 let arm = arm.unwrap_or(Arm::Light);
                 let drift_rad = looks.drift_rad(TREND).or(looks.drift_rad(HUNT));
                 let hindrance = self.hindrance(arm, recent, drift_rad, goal);
-                return Err(self.not_arrived(arm, goal, recent.pose, watch, hindrance));
+                return Err(self.not_arrived(arm, (goal, aim), recent.pose, watch, hindrance));
             }
             self.wait(poll).await?;
         }
@@ -306,7 +319,7 @@ impl<R: Rig> Drive<R> {
             Hindrance::Hunting
         } else if drift_rad > still_rad / 10.0 {
             Hindrance::Creep
-        } else if self.off(arm, recent.pose, goal) > TRIMMABLE * self.file.motion.near_rad {
+        } else if self.off(arm, recent.pose, goal) > self.trimmable_rad() {
             Hindrance::Obstacle
         } else {
             Hindrance::Load
@@ -342,22 +355,47 @@ impl<R: Rig> Drive<R> {
         light.max(sensor).min(LATEST)
     }
 
+    /// By how much an arm may be off its goal to be sent on, rad.
+    fn trimmable_rad(&self) -> f64 {
+        TRIMMABLE_DEG
+            .to_radians()
+            .max(TRIMMABLE * self.file.motion.near_rad)
+    }
+
+    /// Says that an arm is not where it should be, although it was sent to `aim` for that.
     fn not_arrived(
         &self,
         arm: Arm,
-        goal: Pose,
+        (goal, aim): (Pose, Pose),
         measured: Pose,
         watch: Watch,
         hindrance: Hindrance,
     ) -> DriveError<R::Error> {
+        let after = watch.elapsed(self.waited);
+        let seen = *self.seen.borrow();
+        if let Some(has) = seen.and_then(|seen| self.other_goal(arm, &seen, aim)) {
+            return DriveError::GoalNotTaken {
+                arm,
+                goal: aim.angle(arm),
+                has,
+                tried: after,
+            };
+        }
         DriveError::NotArrived {
             arm,
             goal: goal.angle(arm),
             measured: measured.angle(arm),
             near_rad: self.file.motion.near_rad,
-            after: watch.elapsed(self.waited),
+            after,
             hindrance,
         }
+    }
+
+    /// The goal that an arm has, where it is not the one that it was told.
+    fn other_goal(&self, arm: Arm, seen: &Snapshot, told: Pose) -> Option<ArmAngle> {
+        let has = seen.arms[arm as usize].goal;
+        let half_a_count = self.file.arm(arm).axis.resolution_rad() / 2.0;
+        ((has - told.angle(arm)).abs() > half_a_count).then_some(has)
     }
 
     /// How long both arms take by their profiles.
@@ -389,16 +427,15 @@ impl<R: Rig> Drive<R> {
             self.retry("set the arms off", |rig| Box::pin(rig.start(goal)))
                 .await?;
             let snapshot = self.snapshot().await?;
-            let not_taken = Arm::BOTH.into_iter().find(|&arm| {
-                let half_a_count = self.file.arm(arm).axis.resolution_rad() / 2.0;
-                (snapshot.arms[arm as usize].goal - goal.angle(arm)).abs() > half_a_count
-            });
-            let Some(arm) = not_taken else { return Ok(()) };
+            let other = Arm::BOTH
+                .into_iter()
+                .find_map(|arm| Some((arm, self.other_goal(arm, &snapshot, goal)?)));
+            let Some((arm, has)) = other else { return Ok(()) };
             if since.elapsed() >= self.file.bus.silence && repeated >= LEAST {
                 return Err(DriveError::GoalNotTaken {
                     arm,
                     goal: goal.angle(arm),
-                    has: snapshot.arms[arm as usize].goal,
+                    has,
                     tried: since.elapsed(),
                 });
             }

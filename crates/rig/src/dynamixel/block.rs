@@ -25,7 +25,7 @@ impl Block {
     }
 
     /// From one register to another, both included.
-    const fn span(first: Register, last: Register) -> Self {
+    pub(super) const fn span(first: Register, last: Register) -> Self {
         Self {
             address: first.address,
             length: (last.address + last.size - first.address) as usize,

@@ -95,6 +95,10 @@ pub mod servo {
     pub const PRESENT_VELOCITY: Register = register(128, 4, "Present Velocity");
     /// Present Position, counts, signed.
     pub const PRESENT_POSITION: Register = register(132, 4, "Present Position");
+    /// Velocity Trajectory: the speed that the profile has now, 0.229 rpm, signed.
+    pub const VELOCITY_TRAJECTORY: Register = register(136, 4, "Velocity Trajectory");
+    /// Position Trajectory: where the profile is now, counts, signed.
+    pub const POSITION_TRAJECTORY: Register = register(140, 4, "Position Trajectory");
     /// Present Input Voltage, 0.1 V.
     pub const PRESENT_INPUT_VOLTAGE: Register = register(144, 2, "Present Input Voltage");
     /// Present Temperature, °C.

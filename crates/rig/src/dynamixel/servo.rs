@@ -3,6 +3,7 @@ use std::time::Duration;
 use arms::{ArmAngle, Limits, Profile};
 
 use super::block::{self, Block, State, i32_at};
+use super::braking::{self, Braking};
 use super::model::{Indirect, Model};
 use super::node::Node;
 use super::register::{Register, common, servo};
@@ -110,32 +111,10 @@ impl Servo {
     }
 
     /// The goal at which a servo that moves comes to rest on its profile.
-    async fn stopping_goal(&self) -> Result<i32, RigError> {
-        let acceleration = self.node.ask_i32(servo::PROFILE_ACCELERATION).await?;
-        let velocity = self.node.ask_i32(servo::PRESENT_VELOCITY).await?;
-        let heading = f64::from(self.node.ask_i32(servo::GOAL_POSITION).await?);
-        let position = self.node.ask_i32(servo::PRESENT_POSITION).await?;
-        let units = self.settings.axis.units;
-        let v = units.counts(f64::from(velocity) * units.velocity_rad_s);
-        let braking = match acceleration {
-            0 => 0.0,
-            of => v * v / (2.0 * units.counts(f64::from(of) * units.acceleration_rad_s2)),
-        };
-        // The arm has gone on since its position was read; a goal too near would make it swing back.
-        let ahead = braking + v.abs() * self.latency.as_secs_f64();
-        let goal = f64::from(position) + ahead.round().copysign(v);
-        // Nor may it lead beyond where the arm was going: the way was checked only up to there.
-        let onward = (heading - f64::from(position)) * v > 0.0;
-        let goal = match onward {
-            true if v > 0.0 => goal.min(heading),
-            true => goal.max(heading),
-            false => goal,
-        };
-        // Braking must not lead out of the limits, nor back.
-        let ends = [self.limits.min, self.limits.max].map(|end| self.settings.axis.counts(end).round());
-        let (low, high) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
-        let position = f64::from(position);
-        Ok(goal.clamp(low.min(position), high.max(position)) as i32)
+    async fn stopping_goal(&self) -> Result<Option<i32>, RigError> {
+        let registers = self.node.ask(braking::REGISTERS).await?;
+        let ends = [self.limits.min, self.limits.max].map(|end| self.settings.axis.counts(end));
+        Ok(Braking::read(&registers.parameters).rest(&self.settings.axis, ends, self.latency))
     }
 
     /// Whether the bus watchdog has tripped.
@@ -350,8 +329,9 @@ impl Actuator for Servo {
     async fn stop(&mut self) -> Result<(), RigError> {
         let torque = self.node.ask(Block::of(servo::TORQUE_ENABLE)).await?;
         if torque.parameters[0] == 1 {
-            let goal = self.stopping_goal().await?;
-            self.node.tell(servo::GOAL_POSITION, &goal.to_le_bytes()).await?;
+            if let Some(goal) = self.stopping_goal().await? {
+                self.node.tell(servo::GOAL_POSITION, &goal.to_le_bytes()).await?;
+            }
         }
         Ok(())
     }

@@ -240,6 +240,7 @@ fn motion(source: &Source<'_>, raw: &RawMotion, envelope: &Envelope) -> Result<M
         near_rad: near.to_radians(),
         still_rad: still.to_radians(),
         settle: millis(source, "motion.settle_ms", &raw.settle_ms, 0.0..=5000.0)?,
+        late: millis(source, "motion.late_ms", &raw.late_ms, 0.0..=1000.0)?,
         timeout: millis(source, "motion.timeout_ms", &raw.timeout_ms, 50.0..=10000.0)?,
         approach: source.one_of("motion.approach", &raw.approach, &approaches)?,
         overshoot_rad: overshoot.to_radians(),

@@ -55,6 +55,7 @@ pub(super) struct RawMotion {
     pub(super) near_deg: Spanned<f64>,
     pub(super) still_deg: Spanned<f64>,
     pub(super) settle_ms: Spanned<f64>,
+    pub(super) late_ms: Spanned<f64>,
     pub(super) timeout_ms: Spanned<f64>,
     pub(super) approach: Spanned<String>,
     pub(super) overshoot_deg: Spanned<f64>,

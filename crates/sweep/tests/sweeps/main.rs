@@ -37,6 +37,7 @@ fn mechanics() -> Mechanics {
         approach: 0,
         overshoot_rad: 1.0_f64.to_radians(),
         settle_s: 0.02,
+        late_s: 0.0,
         integration_us: [100, 100_000],
         exposures: 9,
         transaction_s: 0.006,
