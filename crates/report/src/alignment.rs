@@ -95,11 +95,17 @@ impl Alignment {
             }
         }
         let prior = |encoders: f64| Prior::new(rig, zeros, columns, encoders);
+        // A narrow lobe that none of its curves can place says that the angles scatter; by how much, it does not say.
+        let untold = match found.lobe {
+            Some(_) => ENCODERS[ENCODERS.len() - 1],
+            None => ENCODERS[0],
+        };
         let best = ENCODERS
             .iter()
+            .filter(|_| !seen.is_empty())
             .map(|&encoders| prior(encoders).told(&rows, &seen))
             .max_by(|a, b| a.likelihood.total_cmp(&b.likelihood));
-        let Posterior { mean, covariance, .. } = best.unwrap_or_else(|| prior(1.0).untold());
+        let Posterior { mean, covariance, .. } = best.unwrap_or_else(|| prior(untold).untold());
         let told = seen
             .iter()
             .enumerate()

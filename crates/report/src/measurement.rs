@@ -253,7 +253,7 @@ fn sharpen(measurements: &mut [Measurement], records: &[Record]) {
 /// weighs more than that is worth.
 const REPRODUCIBLE: f64 = 0.01;
 
-/// The measurements of one sweep that count, by their place in the list, those of one pose together: a flight passes it
+/// The measurements of one sweep that count, by their place in the list, those of one pose together: a flight may pass it
 /// there and back. Those in shadow are left out.
 pub(crate) fn visits(measurements: &[Measurement], sweep: Sweep) -> Vec<Vec<usize>> {
     let mut places: HashMap<[u64; 2], usize> = HashMap::new();

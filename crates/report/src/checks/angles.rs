@@ -23,6 +23,13 @@ pub(crate) fn angles(measurements: &[Measurement]) -> Option<Check> {
     let [light, sensor] = Arm::BOTH.map(|arm| expanded(alignment.lag_rad(arm)));
     let worst = alignment.told.iter().max_by(|a, b| off(a).total_cmp(&off(b)));
     let (verdict, text) = match worst {
+        None if alignment.lobe.is_some() => (
+            Verdict::Unknown,
+            "The lobe of this specimen is narrow, but none of the sweeps tells where it stands: it was read too coarsely, or the arms \
+             came to the poses from both sides. The encoders are taken to err by several times what [uncertainty] encoder_deg \
+             says. Read its planes more densely, or from one side ([motion] approach)."
+                .to_owned(),
+        ),
         None => (
             Verdict::Unknown,
             "No lobe of this specimen is narrow enough, and read on both sides, to tell where the mirror direction is: the \
