@@ -11,6 +11,9 @@ use serialport::{ErrorKind, SerialPortType, TTYPort, UsbPortInfo};
 
 use crate::RigError;
 
+/// Where Linux lists its ports.
+const SYSFS: &str = "/sys/class/tty";
+
 /// A serial port of this machine, with what is known of it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Adapter {
@@ -52,6 +55,7 @@ impl From<UsbPortInfo> for Usb {
 /// # Errors
 /// The system does not say.
 pub fn ports() -> Result<Vec<Adapter>, RigError> {
+    readable(Path::new(SYSFS))?;
     let ports = serialport::available_ports().map_err(|source| RigError::Ports { source })?;
     let mut adapters: Vec<_> = ports
         .into_iter()
@@ -65,6 +69,22 @@ pub fn ports() -> Result<Vec<Adapter>, RigError> {
         .collect();
     adapters.sort_by(|a, b| a.path.cmp(&b.path));
     Ok(adapters)
+}
+
+/// Whether the folder can be read in which Linux lists its ports: without one, as in a root that has no /sys, serialport
+/// panics.
+fn readable(folder: &Path) -> Result<(), RigError> {
+    let tried = if cfg!(target_os = "linux") {
+        folder.read_dir().map(drop)
+    } else {
+        Ok(())
+    };
+    tried.map_err(|error| RigError::Ports {
+        source: serialport::Error::new(
+            ErrorKind::Io(error.kind()),
+            format!("{}: {error}", folder.display()),
+        ),
+    })
 }
 
 /// Opens a port in raw mode at a baud rate and locks it (TIOCEXCL and flock) until the value is dropped.
@@ -97,4 +117,18 @@ pub(super) fn descriptor(port: &TTYPort) -> Result<serial2::SerialPort, serialpo
     // SAFETY: `into_raw_fd` has just handed over an open descriptor that nothing else owns. `serialport` offers no
     // safe way out (no `Into<OwnedFd>`), and `serial2` cannot lock a port.
     Ok(unsafe { serial2::SerialPort::from_raw_fd(descriptor) })
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_root_without_sysfs_is_told_and_not_a_panic() {
+        let error = readable(Path::new("/no such folder")).unwrap_err();
+        assert!(matches!(error, RigError::Ports { .. }), "{error}");
+        let source = std::error::Error::source(&error).map(ToString::to_string);
+        assert!(source.is_some_and(|why| why.starts_with("/no such folder: ")));
+        assert!(readable(&std::env::temp_dir()).is_ok());
+    }
 }
