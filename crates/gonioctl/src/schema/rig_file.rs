@@ -1,31 +1,12 @@
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::sync::Arc;
 
-use brdf::Black;
-use firmware_sim::{Bench, WireSettings};
 use rig::RigFile;
 use serde_json::{Map, Value, json};
 
+use self::place::Place;
 use super::DIALECT;
 
-/// Keys whose range depends on other keys: what the shipped file allows is not what every rig allows.
-const DEPENDENT: [&str; 12] = [
-    "light.zero_deg",
-    "light.velocity_deg_s",
-    "light.acceleration_deg_s2",
-    "sensor.zero_deg",
-    "sensor.velocity_deg_s",
-    "sensor.acceleration_deg_s2",
-    "motion.park_light_deg",
-    "motion.park_sensor_deg",
-    "photometer.integration_max_us",
-    "photometer.enough",
-    "sim.start_light_deg",
-    "sim.start_sensor_deg",
-];
-/// A word that no key takes.
-const NO_WORD: &str = "\"no such word\"";
+mod place;
 
 /// The schema of a rig file.
 ///
@@ -33,7 +14,8 @@ const NO_WORD: &str = "\"no such word\"";
 /// that it refuses with what is allowed. What a key means, and its default, stand in the shipped file.
 pub(super) fn schema() -> Value {
     let shipped = Shipped::read(RigFile::BUILT_IN);
-    let properties: Map<String, Value> = keys("")
+    let properties: Map<String, Value> = Place::of("")
+        .keys()
         .into_iter()
         .map(|table| {
             let schema = shipped.table(&table);
@@ -89,7 +71,8 @@ impl Shipped {
 
     /// The schema of a table, by its path.
     fn table(&self, path: &str) -> Value {
-        let properties: Map<String, Value> = keys(path)
+        let properties: Map<String, Value> = Place::of(path)
+            .keys()
             .into_iter()
             .map(|key| {
                 let schema = self.key(path, &key);
@@ -126,7 +109,7 @@ impl Shipped {
         let value: toml::Table = format!("x = {default}")
             .parse()
             .expect("a test reads the shipped file");
-        let mut schema = form(&path, key, &value["x"]);
+        let mut schema = Place::of(&path).schema(&value["x"], example(about).as_ref());
         schema["default"] = json!(value["x"]);
         if !about.is_empty() {
             schema["description"] = json!(about.trim());
@@ -142,141 +125,17 @@ fn assignment(line: &str) -> Option<(&str, &str)> {
     (key.chars().all(is_key) && format!("x = {value}").parse::<toml::Table>().is_ok()).then_some((key, value))
 }
 
-/// Why a rig file is refused.
-fn refusal(text: &str) -> Option<String> {
-    let rig = match RigFile::parse(text, Path::new("rig file")) {
-        Ok(rig) => rig,
-        Err(error) => return Some(error.to_string()),
-    };
-    // What lies on the stage does not matter here.
-    let bench = Bench::with_specimen(&rig, Arc::new(Black)).map(drop);
-    let simulator = bench.and_then(|()| WireSettings::new(&rig).map(drop));
-    simulator.err().map(|error| error.to_string())
-}
-
-/// Why a value is refused for a key.
-fn refused(path: &str, value: &str) -> Option<String> {
-    refusal(&format!("{path} = {value}\n"))
-}
-
-/// The keys of a table, as the parser names them where it does not know one.
-fn keys(table: &str) -> Vec<String> {
-    let dot = if table.is_empty() { "" } else { "." };
-    let why = refused(&format!("{table}{dot}no_such_key"), "1").unwrap_or_default();
-    let Some((_, expected)) = why.split_once("xpected ") else {
-        return Vec::new();
-    };
-    let words = expected.split('`').skip(1).step_by(2);
-    words.map(str::to_owned).collect()
-}
-
-/// What may stand at a key whose default is this.
-fn form(path: &str, key: &str, default: &toml::Value) -> Value {
-    if path == "suspend.supply_v" {
-        let pair = json!({ "type": "array", "items": { "type": "number", "minimum": 0 }, "minItems": 2, "maxItems": 2 });
-        return json!({ "anyOf": [{ "const": "model" }, pair] });
-    }
-    match default {
-        toml::Value::Boolean(_) => json!({ "type": "boolean" }),
-        toml::Value::String(_) => word(path, key),
-        toml::Value::Integer(_) | toml::Value::Float(_) => number(path),
-        toml::Value::Array(array) if array.is_empty() => {
-            json!({ "type": "array", "items": { "type": "object" } })
-        }
-        toml::Value::Array(array) => {
-            let above = refused(path, &format!("{:?}", vec![0.0; array.len()]))
-                .is_some_and(|why| why.contains("> 0"));
-            let least = if above { "exclusiveMinimum" } else { "minimum" };
-            json!({
-                "type": "array", "items": { "type": "number", least: 0 },
-                "minItems": array.len(), "maxItems": array.len(),
-            })
-        }
-        _ => json!({ "type": "object" }),
-    }
-}
-
-/// A text: one of a few words where the parser says which, else any that is not empty.
-fn word(path: &str, key: &str) -> Value {
-    let allowed = refused(path, NO_WORD).unwrap_or_default();
-    let after = ["allowed: ", "xpected "]
-        .iter()
-        .find_map(|mark| allowed.split_once(mark));
-    let words: Vec<&str> = after.map_or_else(Vec::new, |(_, listed)| {
-        listed.split(['"', '`']).skip(1).step_by(2).collect()
-    });
-    match key {
-        _ if words.is_empty() && refused(path, "\"\"").is_some() => {
-            json!({ "type": "string", "minLength": 1 })
-        }
-        _ if words.is_empty() => json!({ "type": "string" }),
-        // With or without the letter of its bus.
-        "model" => json!({ "type": "string", "pattern": format!("^({})(-[TR])?$", words.join("|")) }),
-        _ => json!({ "enum": words }),
-    }
-}
-
-/// A number, with the range that the parser tells of one that is too large, or too small.
-fn number(path: &str) -> Value {
-    let whole = refused(path, "0.123").is_some_and(|why| why.contains("invalid type: floating"));
-    let kind = if whole { "integer" } else { "number" };
-    let [low, high] = match whole {
-        true => [i64::MIN.to_string(), i64::MAX.to_string()],
-        false => ["-1e300".to_owned(), "1e300".to_owned()],
-    };
-    let why = refused(path, &high)
-        .or_else(|| refused(path, &low))
-        .unwrap_or_default();
-    let allowed = why.rsplit_once("allowed").map_or("", |(_, allowed)| allowed);
-    let listed: Result<Vec<i64>, _> = allowed
-        .trim_start_matches(": ")
-        .split(", ")
-        .map(str::parse)
-        .collect();
-    if let Ok(listed) = listed
-        && whole
-    {
-        return json!({ "enum": listed });
-    }
-    let mut schema = json!({ "type": kind });
-    if refused(path, "0.0").is_some_and(|why| why.contains("> 0")) {
-        schema["exclusiveMinimum"] = json!(0);
-    }
-    if DEPENDENT.contains(&path) {
-        return schema;
-    }
-    if let Some([least, most]) = range(allowed) {
-        schema["minimum"] = least;
-        schema["maximum"] = most;
-        let odd = refused(path, "1").unwrap_or_default();
-        if let Some(step) = odd
-            .rsplit_once("in steps of ")
-            .and_then(|(_, step)| step.parse::<u32>().ok())
-        {
-            schema["multipleOf"] = json!(step);
-        }
-    }
-    schema
-}
-
-/// The bounds in a text such as "allowed: 0 … 100".
-fn range(text: &str) -> Option<[Value; 2]> {
-    let (before, after) = text.split_once(" … ")?;
-    let number = |word: Option<&str>| -> Option<Value> {
-        let word = word?;
-        match word.parse::<i64>() {
-            Ok(whole) => Some(json!(whole)),
-            Err(_) => Some(json!(word.parse::<f64>().ok()?)),
-        }
-    };
-    Some([
-        number(before.split_whitespace().next_back())?,
-        number(after.split_whitespace().next())?,
-    ])
+/// The inline table that a comment gives as an example.
+fn example(comment: &str) -> Option<toml::Value> {
+    let start = comment.find("such as {")? + "such as ".len();
+    let end = start + comment[start..].find('}')? + 1;
+    let mut table: toml::Table = format!("x = {}", &comment[start..end]).parse().ok()?;
+    table.remove("x")
 }
 
 #[cfg(test)]
 mod tests {
+    use super::place::refusal;
     use super::*;
 
     fn validator() -> jsonschema::Validator {
@@ -321,6 +180,11 @@ mod tests {
             "suspend.supply_v = [10.5, 11.0]\n",
             "[sim]\nspecimen = \"./some.binary\"\nfault = [{ device = \"sensor\", at_s = 3.5, what = \"overload\" }]\n",
             "[sim.light]\ncreep = { counts = 1.0, counts_per_s = 5.0 }\n",
+            "[uncertainty]\nangle_deg = 0.05\nplay_deg = 0\n",
+            "[sim]\nfault = [{ device = \"light\", what = { stall_s = 0.2 } }]\n",
+            "[[sim.fault]]\ndevice = \"light\"\nwhat = { mechanics = { stiction_counts = 3, creep = { counts = 1, counts_per_s = 5 } } }\n",
+            "[[sim.fault]]\ndevice = \"photometer\"\nwhat = { room_light = { per_sr = 0.1, for_s = 3.0 } }\n",
+            "[sim.wire]\nsilent = [{ id = 2, from_s = 3.0 }, { id = 3, from_s = 0.0 }]\n",
         ] {
             assert_eq!(refusal(text), None, "{text}");
             let found = json_of(text);
@@ -364,45 +228,143 @@ mod tests {
             "[sim.mishaps]\nsilense = 1.0\n",
             "[sim]\ncrosstalk = 0.6\n",
             "[sim]\nstiction_counts = 101.0\n",
+            "[light]\nzero_deg = 361.0\n",
+            "[sensor]\nvelocity_deg_s = 0.0\n",
+            "[motion]\npark_light_deg = -91.0\n",
+            "[photometer]\nenough = 16777216\n",
+            "[photometer]\nintegration_max_us = 10000001\n",
+            "[uncertainty]\nangle_deg = 11.0\n",
+            "[uncertainty]\nplay_deg = \"both\"\n",
+            "[sim]\nstart_light_deg = -91.0\n",
+            "[sim]\ncreep = { counts = 101.0, counts_per_s = 0.0 }\n",
+            "[sim]\ncreep = { counts = 1.0 }\n",
+            "[sim.sensor]\nring = { counts = 1.0, hz = 51.0, tau_s = 1.0 }\n",
+            "[sim]\nfault = [{ device = \"lamp\", what = \"overload\" }]\n",
+            "[sim]\nfault = [{ device = \"light\", what = \"overlord\" }]\n",
+            "[sim]\nfault = [{ device = \"light\", what = { stall_s = -1.0 } }]\n",
+            "[sim]\nfault = [{ device = \"light\", what = { hardware_error = 256 } }]\n",
+            "[sim]\nfault = [{ device = \"light\", what = { turn_deg = 181.0 } }]\n",
+            "[sim]\nfault = [{ device = \"light\", what = { mechanics = { jitter_counts = 51.0 } } }]\n",
+            "[sim]\nfault = [{ device = \"light\", at_s = -1.0, what = \"overload\" }]\n",
+            "[sim]\nfault = [{ device = \"light\" }]\n",
+            "[sim.wire]\nsilent = [{ id = 253, from_s = 3.0 }]\n",
+            "[sim.wire]\nsilent = [{ id = 2 }]\n",
         ] {
             assert!(refusal(text).is_some(), "{text}");
             assert!(!schema.is_valid(&json_of(text)), "{text}");
         }
     }
 
-    /// Whatever the schema says of a number is what the parser says, on either side; and nothing is left unsaid but what
-    /// depends on other keys.
-    #[test]
-    fn every_key_has_a_meaning_and_every_number_its_range() {
-        fn walk(schema: &Value, path: &str, tried: &mut usize) {
+    /// Every key that has no table of its own, with its schema.
+    fn leaves() -> Vec<(String, Value)> {
+        fn walk(schema: &Value, path: &str, found: &mut Vec<(String, Value)>) {
             for (key, schema) in schema["properties"].as_object().unwrap() {
                 let path = format!("{path}{key}");
-                if schema["properties"].is_object() {
-                    walk(schema, &format!("{path}."), tried);
-                    continue;
+                // Inline tables have a default, tables with a header have none.
+                match schema["properties"].is_object() && schema["default"].is_null() {
+                    true => walk(schema, &format!("{path}."), found),
+                    false => found.push((path, schema.clone())),
                 }
-                assert!(schema["description"].is_string(), "{path} is not explained");
-                for (bound, by) in [("minimum", -1.0), ("maximum", 1.0)] {
-                    if let Some(bound) = schema[bound].as_f64() {
-                        let beyond = match schema["type"] == "integer" {
-                            true => format!("{}", i128::from(bound as i64) + by as i128),
-                            false => format!("{:?}", bound + by),
-                        };
-                        assert!(refused(&path, &beyond).is_some(), "{path} takes {beyond}");
-                        *tried += 1;
-                    }
-                }
-                let is_number = ["integer", "number"].contains(&schema["type"].as_str().unwrap_or_default());
-                let is_bounded = schema["maximum"].is_number() || schema["exclusiveMinimum"].is_number();
-                let depends = DEPENDENT.contains(&path.as_str());
-                assert!(
-                    !is_number || is_bounded || depends,
-                    "{path} has no range: {schema}"
-                );
             }
         }
+        let mut found = Vec::new();
+        walk(&schema(), "", &mut found);
+        assert!(found.len() > 150, "only {} keys", found.len());
+        found
+    }
+
+    /// Whether a schema, or one within it, is of numbers without a range and without a reason why there is none.
+    fn has_boundless(schema: &Value) -> bool {
+        match schema {
+            Value::Array(all) => all.iter().any(has_boundless),
+            Value::Object(all) => {
+                let is_number = all
+                    .get("type")
+                    .is_some_and(|kind| kind == "number" || kind == "integer");
+                let is_bounded = ["minimum", "maximum"]
+                    .iter()
+                    .all(|bound| all.contains_key(*bound));
+                let is_said = is_bounded || all.contains_key("enum") || all.contains_key("$comment");
+                (is_number && !is_said) || all.values().any(has_boundless)
+            }
+            _ => false,
+        }
+    }
+
+    #[test]
+    fn every_key_has_a_meaning_and_every_number_its_range_or_why_it_has_none() {
         let mut tried = 0;
-        walk(&schema(), "", &mut tried);
-        assert!(tried > 150, "only {tried} bounds");
+        for (path, schema) in leaves() {
+            assert!(schema["description"].is_string(), "{path} is not explained");
+            assert!(!has_boundless(&schema), "{path} has no range: {schema}");
+            for (bound, by) in [("minimum", -1.0), ("maximum", 1.0)] {
+                if let Some(bound) = schema[bound].as_f64() {
+                    let beyond = match schema["type"] == "integer" {
+                        true => format!("{}", i128::from(bound as i64) + by as i128),
+                        false => format!("{:?}", bound + by),
+                    };
+                    assert!(
+                        refusal(&format!("{path} = {beyond}\n")).is_some(),
+                        "{path} takes {beyond}"
+                    );
+                    tried += 1;
+                }
+            }
+        }
+        assert!(tried > 170, "only {tried} bounds");
+    }
+
+    /// What an editor marks as wrong is wrong: the schema takes whatever the parser takes.
+    #[test]
+    fn what_the_parser_takes_the_schema_takes() {
+        let schema = validator();
+        let mut taken = 0;
+        for (path, of_key) in leaves() {
+            for value in [
+                "-1",
+                "0",
+                "1",
+                "7",
+                "20",
+                "1000",
+                "1000000",
+                "-0.5",
+                "0.0",
+                "0.5",
+                "1.0",
+                "45.0",
+                "-45.0",
+                "200.5",
+                "1e9",
+                "true",
+                "false",
+                "\"x\"",
+                "\"model\"",
+                "\"none\"",
+                "[]",
+                "[0, 0]",
+                "[1.0, 2.0]",
+                "[2.0, 1.0]",
+                "[1.0, 1.0, 1e9]",
+                "{ counts = 1, counts_per_s = 2 }",
+                "[{ id = 2, from_s = 3 }]",
+            ] {
+                // Numbers in the order of its keys are read as an inline table, which nobody is told.
+                if of_key["properties"].is_object() && value.starts_with('[') {
+                    continue;
+                }
+                let text = format!("{path} = {value}\n");
+                if refusal(&text).is_none() {
+                    let found = json_of(&text);
+                    assert!(
+                        schema.is_valid(&found),
+                        "{text}: {:?}",
+                        schema.iter_errors(&found).next()
+                    );
+                    taken += 1;
+                }
+            }
+        }
+        assert!(taken > 500, "only {taken} values");
     }
 }
