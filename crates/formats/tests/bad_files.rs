@@ -109,6 +109,158 @@ proptest! {
     }
 }
 
+/// Words that stand in no file, or not where they are put.
+const ODD: [&str; 20] = [
+    "-1",
+    "0",
+    "-0.0",
+    "1e308",
+    "-1e308",
+    "1e-320",
+    "NaN",
+    "inf",
+    "-inf",
+    "1e999",
+    "18446744073709551616",
+    "4294967295",
+    "-2147483648",
+    "0x10",
+    "1.",
+    "",
+    "\"",
+    "\u{feff}",
+    "\u{202e}9",
+    "1 1 1 1 1 1 1 1 1",
+];
+
+/// What is done to the words and lines of a file.
+#[derive(Clone, Debug)]
+enum Change {
+    /// A word becomes an odd one.
+    Word(f64, usize),
+    /// A line is left out.
+    Drop(f64),
+    /// A line comes again, so many times.
+    Repeat(f64, usize),
+    /// Two lines change places.
+    Swap(f64, f64),
+    /// From a line on, the file goes on as that of another format from a place.
+    Splice(f64, usize, f64),
+}
+
+fn changes() -> impl Strategy<Value = Change> {
+    let place = || 0.0..1.0_f64;
+    prop_oneof![
+        4 => (place(), 0..ODD.len()).prop_map(|(at, odd)| Change::Word(at, odd)),
+        1 => place().prop_map(Change::Drop),
+        1 => (place(), 1..40_usize).prop_map(|(at, times)| Change::Repeat(at, times)),
+        1 => (place(), place()).prop_map(|(a, b)| Change::Swap(a, b)),
+        1 => (place(), 0..FORMATS.len(), place()).prop_map(|(at, other, from)| Change::Splice(at, other, from)),
+    ]
+}
+
+/// A share of a length as an index; most of what can go wrong stands at the start.
+fn index(share: f64, length: usize) -> usize {
+    ((share * share * length as f64) as usize).min(length.saturating_sub(1))
+}
+
+/// The bytes with a change made to their lines.
+fn changed(bytes: &[u8], change: &Change) -> Vec<u8> {
+    let mut lines: Vec<Vec<u8>> = bytes.split(|&byte| byte == b'\n').map(<[u8]>::to_vec).collect();
+    let count = lines.len();
+    match *change {
+        Change::Word(at, odd) => {
+            let line = &mut lines[index(at, count)];
+            let mut words: Vec<Vec<u8>> = line
+                .split(|byte| b" ,\t".contains(byte))
+                .map(<[u8]>::to_vec)
+                .collect();
+            let separator = line
+                .iter()
+                .copied()
+                .find(|byte| b" ,\t".contains(byte))
+                .unwrap_or(b' ');
+            let word = index((at * 7919.0).fract(), words.len());
+            words[word] = ODD[odd].as_bytes().to_vec();
+            *line = words.join(&separator);
+        }
+        Change::Drop(at) => {
+            lines.remove(index(at, count));
+        }
+        Change::Repeat(at, times) => {
+            let at = index(at, count);
+            let line = lines[at].clone();
+            lines.splice(at..at, std::iter::repeat_n(line, times));
+        }
+        Change::Swap(a, b) => lines.swap(index(a, count), index(b, count)),
+        Change::Splice(at, other, from) => {
+            let (_, other) = &FILES[other % FILES.len()];
+            let mut spliced = lines[..index(at, count)].join(&b'\n');
+            spliced.extend_from_slice(&other[index(from, other.len())..]);
+            return spliced;
+        }
+    }
+    lines.join(&b'\n')
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+
+    /// Whatever a text editor, a script or a broken download makes of a file: each format's own reader, and that of the format
+    /// that it looks like then, read it or refuse it.
+    #[test]
+    fn prop_a_file_whose_words_and_lines_are_others_does_no_harm(
+        changes in proptest::collection::vec(changes(), 1..5),
+    ) {
+        for (format, bytes) in FILES.iter() {
+            let mutated = changes.iter().fold(bytes.clone(), |bytes, change| changed(&bytes, change));
+            let _ = try_out(format, &mutated);
+            if let Some(other) = formats::recognise(&mutated) {
+                let _ = try_out(other, &mutated);
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    /// The table of MERL has no words: three numbers, then as many as they say.
+    #[test]
+    fn prop_a_merl_file_with_another_head_or_another_length_or_odd_numbers_does_no_harm(
+        head in proptest::collection::vec(prop_oneof![any::<i32>(), Just(90), Just(180)], 3),
+        kept in any::<bool>(),
+        length in 0..40_000_usize,
+        number in prop_oneof![any::<f64>(), Just(f64::NAN), Just(f64::INFINITY), Just(-1.0)],
+    ) {
+        let merl = Format::named("merl").expect("it is one");
+        let whole = if kept { vec![90, 90, 180] } else { head };
+        let mut bytes: Vec<u8> = whole.iter().flat_map(|number: &i32| number.to_le_bytes()).collect();
+        bytes.extend(number.to_le_bytes().iter().cycle().take(length));
+        prop_assert!(try_out(merl, &bytes).is_err(), "it is far too short");
+    }
+}
+
+#[test]
+fn a_merl_file_of_numbers_that_are_none_is_read_as_nothing_or_refused() {
+    let merl = Format::named("merl").expect("it is one");
+    for number in [
+        f64::NAN,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        f64::MAX,
+        f64::MIN_POSITIVE,
+        -1.0,
+    ] {
+        let mut bytes: Vec<u8> = [90, 90, 180]
+            .iter()
+            .flat_map(|number: &i32| number.to_le_bytes())
+            .collect();
+        bytes.extend(number.to_le_bytes().repeat(3 * 90 * 90 * 180));
+        let _ = try_out(merl, &bytes);
+    }
+}
+
 #[test]
 fn a_missing_end_is_told_with_its_place() {
     for (format, bytes) in FILES.iter() {
