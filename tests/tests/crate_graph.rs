@@ -15,13 +15,13 @@ const EDGES: [(&str, &[&str]); 17] = [
     ("sweep", &["pdv", "arms", "config"]),
     ("rig", &["arms", "config"]),
     ("capture", &["sweep", "rig", "pdv"]),
-    ("report", &["capture", "pdv", "brdf"]),
+    ("report", &["capture", "pdv", "formats"]),
     ("firmware-sim", &["brdf", "arms", "rig", "terminal"]),
-    ("study", &["report", "firmware-sim", "formats"]),
+    ("study", &["report", "firmware-sim"]),
     ("session", &["report", "firmware-sim"]),
     ("api", &[]),
     ("goniod", &["session", "api"]),
-    ("gonioctl", &["session", "api", "study", "formats"]),
+    ("gonioctl", &["session", "api", "study"]),
     ("tests", &["gonioctl", "goniod"]),
 ];
 

@@ -6,9 +6,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use serde_json::Value;
 use tests::run;
 
 const GONIOCTL: &str = env!("CARGO_BIN_EXE_e2e-gonioctl");
+const JOB: &str = "specimen = \"gold paint\"\non_stage = true\n[[plane]]\ntheta_r_deg = 60.0\nreadings = 24\n[arc]\nreadings = 16\n\
+    [reconstruction]\nmodel = \"reciprocal\"\n";
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().to_owned()
@@ -16,10 +19,14 @@ fn root() -> PathBuf {
 
 /// A run of one plane and an arc with a reciprocal model.
 fn captured(here: &Path) -> PathBuf {
-    let job = "specimen = \"gold paint\"\non_stage = true\n[[plane]]\ntheta_r_deg = 60.0\nreadings = 24\n[arc]\nreadings = 16\n\
-        [reconstruction]\nmodel = \"reciprocal\"\n";
+    captured_with(here, "", "")
+}
+
+/// The same with more in the job file and in the rig file.
+fn captured_with(here: &Path, job: &str, rig: &str) -> PathBuf {
+    let job = format!("{job}{JOB}");
     fs::write(here.join("job.toml"), job).unwrap();
-    fs::write(here.join("rig.toml"), "").unwrap();
+    fs::write(here.join("rig.toml"), rig).unwrap();
     let finished = run(GONIOCTL, here, &["run", "job.toml", "--rig", "rig.toml"]).expect(0);
     here.join(finished.stdout.trim())
 }
@@ -41,7 +48,7 @@ fn a_run_comes_in_every_format_from_its_journal_alone() {
         .expect(0)
         .stdout;
     let names = list.lines().filter_map(|line| line.split(' ').next());
-    let names: Vec<&str> = names.filter(|&name| name != "csv").collect();
+    let names: Vec<&str> = names.filter(|name| !["csv", "all"].contains(name)).collect();
     assert!(names.len() > 10, "{list}");
     for name in names {
         let told = run(
@@ -72,13 +79,99 @@ fn a_run_comes_in_every_format_from_its_journal_alone() {
 }
 
 #[test]
+fn a_job_gets_the_files_for_which_it_asks_and_the_report_says_what_was_found_of_each() {
+    let temporary = tempfile::tempdir().unwrap();
+    let here = temporary.path();
+    let formats = "formats = [\"ssdd\", \"gltf\", \"astm\"]\n";
+    let directory = captured_with(here, formats, "[sim]\nspecimen = \"chrome\"\n");
+    let report = fs::read_to_string(directory.join("report.json")).unwrap();
+    let report: Value = serde_json::from_str(&report).unwrap();
+    let exports = report["exports"].as_array().unwrap();
+    let of: Vec<&str> = exports
+        .iter()
+        .map(|export| export["format"].as_str().unwrap())
+        .collect();
+    assert_eq!(of, ["ssdd", "gltf", "astm"]);
+    for export in &exports[..2] {
+        let name = export["file"].as_str().unwrap();
+        assert!(name.starts_with("gold-paint-20"), "{name}");
+        let (_, brdf) = formats::read(&directory.join(name)).unwrap();
+        assert!(brdf.eval(glam::DVec3::Z, glam::DVec3::Z).min_element() > 0.0);
+        let size = fs::metadata(directory.join(name)).unwrap().len();
+        assert_eq!(export["bytes"], size);
+        assert!(
+            export["median_rel"].is_number() && export["text"].as_str().unwrap().starts_with("read back")
+        );
+    }
+    assert_eq!(
+        exports[2]["file"],
+        Value::Null,
+        "no grid of θ_s and φ_s holds chrome"
+    );
+    assert!(
+        exports[2]["text"]
+            .as_str()
+            .unwrap()
+            .contains("astm does not hold this specimen")
+    );
+    let page = fs::read_to_string(directory.join("report.html")).unwrap();
+    assert!(page.contains("-ssdd.ssdd") && page.contains("astm does not hold"));
+}
+
+#[test]
+fn a_run_is_exported_by_its_id_into_a_directory_under_a_name_of_its_own() {
+    let temporary = tempfile::tempdir().unwrap();
+    let here = temporary.path();
+    let directory = captured(here);
+    let name = directory.file_name().unwrap().to_str().unwrap();
+    let id = name.rsplit('-').next().unwrap();
+    fs::create_dir(here.join("out")).unwrap();
+    for (format, extension) in [("ssdd", "ssdd"), ("csv", "csv"), ("merl", "binary")] {
+        let told = run(GONIOCTL, here, &["export", id, "--format", format, "--to", "out"])
+            .expect(0)
+            .stderr;
+        let name = told.lines().next().unwrap().strip_prefix("writes ").unwrap();
+        assert!(
+            name.starts_with("out/gold-paint-20") && name.ends_with(extension),
+            "{name}"
+        );
+        assert!(here.join(name).is_file(), "{name}");
+    }
+    let unknown = run(
+        GONIOCTL,
+        here,
+        &[
+            "export",
+            "01ARZ3NDEKTSV4RRFFQ69G5FAV",
+            "--format",
+            "ssdd",
+            "--daemon",
+            "http://127.0.0.1:1",
+        ],
+    )
+    .expect(5)
+    .stderr;
+    assert!(
+        unknown.contains("has the id 01ARZ3NDEKTSV4RRFFQ69G5FAV"),
+        "{unknown}"
+    );
+}
+
+#[test]
 fn what_cannot_be_exported_is_told() {
     let temporary = tempfile::tempdir().unwrap();
     let here = temporary.path();
     let none = run(GONIOCTL, here, &["export", "--format", "rgl-rgb"])
         .expect(2)
         .stderr;
-    assert!(none.contains("run directory is missing"), "{none}");
+    assert!(none.contains("the run is missing"), "{none}");
+    let nowhere = run(GONIOCTL, here, &["export", "runs/2026", "--format", "astm"])
+        .expect(2)
+        .stderr;
+    assert!(
+        nowhere.contains("neither the id of a run nor the address"),
+        "{nowhere}"
+    );
     let refused = run(GONIOCTL, here, &["convert", "chrome", "chrome.astm"])
         .expect(2)
         .stderr;

@@ -185,6 +185,41 @@ fn a_specimen_is_submitted_laid_on_the_stage_and_watched_to_its_end() {
 }
 
 #[test]
+fn the_result_of_a_run_is_exported_from_the_daemon_by_its_id_and_by_an_address() {
+    let service = Service::start(&["--listen", "127.0.0.1:0"]);
+    let none = service
+        .gonioctl(&["export", &service.address, "--format", "ssdd"])
+        .expect(2);
+    assert!(none.stderr.contains("no run with a result"), "{none:?}");
+    let id = service.submit("short.toml");
+    let _ = service.gonioctl(&["ready", &id]).expect(0);
+    let _ = service.gonioctl(&["watch", &id]).expect(0);
+    let job = service.rig(&["jobs", "--all"]);
+    let run = job["jobs"][0]["run"].as_str().unwrap().to_owned();
+    let of_run = [
+        run.clone(),
+        service.address.clone(),
+        format!("{}/#run/{run}", service.address),
+        format!("{}/api/v1/runs/{run}", service.address),
+    ];
+    let mut files = Vec::new();
+    for (n, run) in of_run.iter().enumerate() {
+        let to = format!("{n}.ssdd");
+        let told = service
+            .gonioctl(&["export", run, "--format", "ssdd", "--to", &to])
+            .expect(0);
+        assert!(told.stderr.contains("ssdd: read back"), "{run}: {told:?}");
+        files.push(fs::read(service.directory.path().join(to)).unwrap());
+    }
+    assert!(files.iter().all(|file| *file == files[0]));
+    let readings = service
+        .gonioctl(&["export", &run, "--format", "csv"])
+        .expect(0)
+        .stdout;
+    assert!(readings.starts_with("index,sweep,"), "{readings}");
+}
+
+#[test]
 fn a_run_is_paused_stopped_and_gone_on_with() {
     let service = Service::start(&["--listen", "127.0.0.1:0"]);
     let id = service.submit("long.toml");

@@ -6,7 +6,7 @@ mod roots;
 mod stream;
 mod unix;
 
-use std::io::BufReader;
+use std::io::{BufReader, Read};
 use std::path::Path;
 use std::time::Duration;
 
@@ -172,6 +172,22 @@ impl Client {
     pub fn read_text(&self, path: &str) -> Result<String, ClientError> {
         let mut answer = self.send(Method::GET, path, &[], SendBody::none())?;
         answer.read_to_string().map_err(|error| self.unreachable(error))
+    }
+
+    /// Returns the runs, the newest first.
+    ///
+    /// # Errors
+    /// As [`Client::read`].
+    pub fn runs(&self) -> Result<Vec<RunView>, ClientError> {
+        self.read("/runs")
+    }
+
+    /// Reads the file at a path below the API, as it comes.
+    ///
+    /// # Errors
+    /// As [`Client::read`].
+    pub fn download(&self, path: &str) -> Result<impl Read + use<>, ClientError> {
+        Ok(self.send(Method::GET, path, &[], SendBody::none())?.into_reader())
     }
 
     /// Asks for an act that has no answer but that it was done or asked for.

@@ -8,6 +8,7 @@ mod acknowledgement;
 #[cfg(feature = "client")]
 pub mod client;
 mod event;
+mod export;
 mod fault;
 mod job;
 mod jog;
@@ -22,6 +23,7 @@ pub use acknowledgement::Acknowledgement;
 #[cfg(feature = "client")]
 pub use client::{Client, ClientError};
 pub use event::{Event, What};
+pub use export::ExportView;
 pub use fault::{FaultCode, FaultId, FaultView};
 pub use job::{Action, Job, JobId};
 pub use jog::{ArmName, Jog};

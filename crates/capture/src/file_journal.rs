@@ -92,6 +92,14 @@ impl FileJournal {
         Ok(parse(&bytes, path)?.0)
     }
 
+    /// Reads all whole records of the bytes of a journal file, which errors call `name`.
+    ///
+    /// # Errors
+    /// They are no journal, or damaged before the last line.
+    pub fn parse(bytes: &[u8], name: impl AsRef<Path>) -> Result<Vec<Record>, JournalError> {
+        Ok(parse(bytes, name.as_ref())?.0)
+    }
+
     /// Writes records in the form of a journal file, for one that is made whole from another place.
     ///
     /// # Errors

@@ -59,6 +59,8 @@ pub struct Metadata {
     pub instrument: String,
     /// Id of the run; empty where there was none.
     pub run: String,
+    /// Half angles of light source and detector as seen from the specimen, degrees; `None` where they are not known.
+    pub apertures_deg: Option<[f64; 2]>,
     /// Solid angle of the detector as seen from the specimen, sr; `None` where it is not known.
     pub solid_angle_sr: Option<f64>,
     /// Wavelengths that stand for red, green and blue, nm, descending.
@@ -75,6 +77,7 @@ impl Default for Metadata {
             date: String::new(),
             instrument: String::new(),
             run: String::new(),
+            apertures_deg: None,
             solid_angle_sr: None,
             wavelengths_nm: Self::WAVELENGTHS_NM,
             uncertainty: String::new(),
@@ -91,12 +94,16 @@ impl Metadata {
     pub(crate) fn lines(&self) -> Vec<(&'static str, String)> {
         let clean = |text: &str| text.replace(char::is_control, " ").trim().to_owned();
         let [red, green, blue] = self.wavelengths_nm;
+        let apertures = self
+            .apertures_deg
+            .map(|[light, sensor]| format!("{light} {sensor}"));
         let solid_angle = self.solid_angle_sr.map(|sr| sr.to_string());
         [
             ("specimen", clean(&self.specimen)),
             ("date", clean(&self.date)),
             ("instrument", clean(&self.instrument)),
             ("run", clean(&self.run)),
+            ("apertures_deg", apertures.unwrap_or_default()),
             ("solid_angle_sr", solid_angle.unwrap_or_default()),
             ("wavelengths_nm", format!("{red} {green} {blue}")),
             ("uncertainty", clean(&self.uncertainty)),

@@ -208,14 +208,19 @@ pub(crate) enum Command {
     ///
     /// It does not matter whether the run wrote that format: the model is rebuilt from the readings.
     Export {
-        /// The run directory.
-        run: Option<PathBuf>,
-        /// What to write: a format, "csv" for the readings, or "list" to list all formats with what they keep.
+        /// The run directory; or the id of a run, in ./runs or at the daemon; or the address of a daemon, alone for its newest
+        /// run with a result, or with /runs/ID behind it.
+        run: Option<String>,
+        /// What to write: a format, "csv" for the readings, "all" for a ZIP archive of everything, or "list" to list all
+        /// formats with what they keep.
         #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(export::words()))]
         format: String,
-        /// Where to; stdout unless given.
+        /// Where to: a file, or a directory, in which it is named for the specimen, the date and the format; stdout unless
+        /// given.
         #[arg(long, value_name = "FILE")]
         to: Option<PathBuf>,
+        #[command(flatten)]
+        daemon: DaemonArguments,
     },
     /// Write a BRDF file of any format in another one; the file is read back before it is done.
     Convert {
@@ -355,7 +360,7 @@ pub(crate) struct RigArgument {
 }
 
 /// Which daemon.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct DaemonArguments {
     /// Where the daemon is: unix:PATH, http://HOST:PORT, or https://HOST/PATH [default: the socket
     /// $XDG_RUNTIME_DIR/goniod.sock or /run/goniod/goniod.sock, else http://127.0.0.1:4664].
@@ -373,6 +378,14 @@ impl DaemonArguments {
     /// Whether nobody asked for a daemon that refuses so: it is not named, and wants a token that was not given.
     pub(crate) fn is_unasked(&self, refused: &Refused) -> bool {
         self.daemon.is_none() && self.token_file.is_none() && refused.unauthorized()
+    }
+
+    /// The same for the daemon at an address.
+    pub(crate) fn at(&self, address: &str) -> Self {
+        Self {
+            daemon: Some(address.to_owned()),
+            ..self.clone()
+        }
     }
 
     /// The client of that daemon; asks nothing yet.

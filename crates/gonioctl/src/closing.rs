@@ -107,6 +107,14 @@ impl Closing {
                 terminal::say(line);
             }
         }
+        for export in report["exports"].as_array().into_iter().flatten() {
+            let [format, file, text] =
+                ["format", "file", "text"].map(|key| export[key].as_str().unwrap_or_default());
+            match file {
+                "" => terminal::say(format_args!("refused   {text}")),
+                file => terminal::say(format_args!("{format:<9} {file}: {text}")),
+            }
+        }
         for check in self.findings() {
             let [verdict, name, text] =
                 ["verdict", "name", "text"].map(|key| check[key].as_str().unwrap_or_default());

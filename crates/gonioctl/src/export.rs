@@ -4,18 +4,21 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use formats::{Export, FORMATS, Format};
-use report::RunDirectory;
+use report::RunExport;
 
-use crate::rebuilt::Rebuilt;
+use crate::cli::DaemonArguments;
+use crate::run_files::RunFiles;
 
 /// The readings of a run, which are no BRDF and so no format of `formats`.
-pub(crate) const READINGS: &str = "csv";
+const READINGS: &str = "csv";
+/// What stands for everything in one archive.
+const ALL: &str = "all";
 /// What lists all formats instead of writing one.
-pub(crate) const LIST: &str = "list";
+const LIST: &str = "list";
 
 /// Every word that `--format` takes.
 pub(crate) fn words() -> impl Iterator<Item = &'static str> {
-    [LIST, READINGS]
+    [LIST, ALL, READINGS]
         .into_iter()
         .chain(FORMATS.iter().map(|format| format.name))
 }
@@ -26,25 +29,56 @@ pub(crate) fn words() -> impl Iterator<Item = &'static str> {
 /// figures of what was written go to stderr.
 ///
 /// # Errors
-/// No run is named; it is not complete; the format does not hold its result; the target cannot be written.
-pub(crate) fn export(run: Option<&Path>, format: &str, to: Option<&Path>) -> anyhow::Result<()> {
+/// No run is named, or there is none; it is not complete; the format does not hold its result; the target cannot be
+/// written.
+pub(crate) fn export(
+    run: Option<&str>,
+    daemon: &DaemonArguments,
+    format: &str,
+    to: Option<&Path>,
+) -> anyhow::Result<()> {
     if format == LIST {
         return list();
     }
-    let run = run.context("the run directory is missing: gonioctl export RUN_DIR --format NAME")?;
-    let directory = RunDirectory::at(run);
+    let run = run.context("the run is missing: gonioctl export RUN --format NAME")?;
+    let files = RunFiles::find(run, daemon)?;
+    let to = target(&files, format, to)?;
+    let to = to.as_deref();
     let kept = match format {
         READINGS => Some("readings.csv"),
         "merl" => Some("brdf.binary"),
         "exr" => Some("slice.exr"),
         _ => None,
     };
-    let kept = kept.map(|name| directory.file(name));
-    if let Some(path) = kept.filter(|path| format == READINGS || path.exists()) {
-        return copy(&path, to);
+    let found = kept.map(|name| files.open(name)).transpose()?.flatten();
+    if let Some(mut found) = found {
+        return put(to, |mut out| io::copy(&mut found, &mut out).map(drop));
     }
-    let rebuilt = Rebuilt::from_journal(&directory)?;
-    write(Format::named(format)?, &rebuilt.export(), to)
+    anyhow::ensure!(
+        format != READINGS,
+        "this run has no readings.csv; `gonioctl reconstruct` makes it of its journal"
+    );
+    let result = RunExport::from_records(&files.records()?)?;
+    if format == ALL {
+        return put(to, |out| result.archive(out));
+    }
+    write(Format::named(format)?, &result.export(), to)
+}
+
+/// The file that is written: in a directory one that is named for the run and the format, which is told.
+fn target(files: &RunFiles, format: &str, to: Option<&Path>) -> anyhow::Result<Option<PathBuf>> {
+    let Some(directory) = to.filter(|to| to.is_dir()) else {
+        return Ok(to.map(Path::to_owned));
+    };
+    let result = RunExport::from_records(&files.records()?)?;
+    let name = match format {
+        READINGS => result.name_of("readings", "csv"),
+        ALL => result.name_of(ALL, "zip"),
+        name => result.file_name(Format::named(name)?),
+    };
+    let path = directory.join(name);
+    terminal::say(format_args!("writes {}", path.display()));
+    Ok(Some(path))
 }
 
 /// Writes a BRDF in a format to a file, or to stdout; the figures go to stderr.
@@ -62,6 +96,9 @@ fn list() -> anyhow::Result<()> {
     terminal::line(
         "csv (.csv): The readings of the run, one row each, as readings.csv has them. Nothing is lost but the BRDF.",
     )?;
+    terminal::line(
+        "all (.zip): Archive of the readings and of every format that holds the result, with the figures of each.",
+    )?;
     for format in &FORMATS {
         terminal::line(format_args!(
             "{} (.{}): {}",
@@ -69,16 +106,6 @@ fn list() -> anyhow::Result<()> {
         ))?;
     }
     Ok(())
-}
-
-fn copy(path: &Path, to: Option<&Path>) -> anyhow::Result<()> {
-    let mut source = File::open(path).with_context(|| {
-        format!(
-            "cannot open {}; `gonioctl reconstruct` makes it of a complete run",
-            path.display()
-        )
-    })?;
-    put(to, |mut out| io::copy(&mut source, &mut out).map(drop))
 }
 
 /// Fills a file, which appears under its name only when it is whole, or stdout.

@@ -26,9 +26,9 @@ mod plan;
 mod ports;
 mod progress;
 mod queue;
-mod rebuilt;
 mod reconstruct;
 mod run;
+mod run_files;
 mod schema;
 mod screen;
 mod signals;
@@ -153,7 +153,12 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             );
         }
         Command::Park { daemon, output } => return send(OperatorCommand::Park, &daemon, output),
-        Command::Export { run, format, to } => export::export(run.as_deref(), &format, to.as_deref())?,
+        Command::Export {
+            run,
+            format,
+            to,
+            daemon,
+        } => export::export(run.as_deref(), &daemon, &format, to.as_deref())?,
         Command::Convert { from, to, format } => convert::convert(&from, &to, format.as_deref())?,
         Command::Eval {
             truth,

@@ -17,7 +17,7 @@ use crate::progress::Progress;
 use crate::signals::{STEPS, Signals};
 
 /// Where run directories are made unless told otherwise.
-const RUNS: &str = "runs";
+pub(crate) const RUNS: &str = "runs";
 
 /// What `run` is to do.
 pub(crate) enum Task<'a> {

@@ -148,6 +148,9 @@ mod tests {
         for bad in [
             "speciment = \"x\"\n",
             "on_stage = \"yes\"\n",
+            "formats = \"astm\"\n",
+            "formats = [\"jpeg\"]\n[[plane]]\ntheta_r_deg = 45.0\nreadings = 6\n",
+            "formats = [\"astm\", \"astm\"]\n[[plane]]\ntheta_r_deg = 45.0\nreadings = 6\n",
             "plane = 3\n",
             "[[plane]]\ntheta_r_deg = 45.0\n",
             "[[plane]]\ntheta_r_deg = 89.0\nreadings = 10\n",

@@ -4,7 +4,8 @@ use std::time::SystemTime;
 
 use arms::{Arm, ArmAngle};
 use capture::{Command, FileJournal, Record};
-use report::RunDirectory;
+use formats::Format;
+use report::{RunDirectory, RunExport};
 use rig::RigFile;
 use tokio::sync::{mpsc, oneshot, watch};
 
@@ -380,6 +381,32 @@ impl Daemon {
             .reported(id, &self.shared.now(), verdict)
             .await?;
         self.run(id).await
+    }
+
+    /// Makes the file of a run's result in a format, and its name.
+    ///
+    /// # Errors
+    /// No such run or format; the run has no BRDF, or the format does not hold it.
+    pub async fn export(&self, id: &str, format: &str) -> Result<(String, Vec<u8>), Refusal> {
+        let format =
+            Format::named(format).map_err(|error| Refusal::new(RefusalKind::NotFound, error.to_string()))?;
+        let run = self.run_export(id).await?;
+        let exported = blocking(move || {
+            let exported = format.export(&run.export());
+            exported.map(|exported| (run.file_name(format), exported.bytes))
+        })
+        .await?;
+        exported.map_err(|error| Refusal::conflict(chain(&error)))
+    }
+
+    /// The result of a run with all that a file in some format can say of it.
+    ///
+    /// # Errors
+    /// As [`Self::run`]; the run has no BRDF.
+    pub async fn run_export(&self, id: &str) -> Result<RunExport, Refusal> {
+        let records = self.records(id).await?;
+        let run = blocking(move || RunExport::from_records(&records)).await?;
+        run.map_err(|error| Refusal::conflict(chain(&error)))
     }
 
     async fn records(&self, id: &str) -> Result<Vec<Record>, Refusal> {

@@ -8,6 +8,7 @@ mod body;
 mod connections;
 mod credential;
 mod events;
+mod exports;
 mod job_file;
 mod jobs;
 mod listener;

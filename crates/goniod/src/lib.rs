@@ -23,8 +23,8 @@ mod view;
 mod worker;
 
 pub use api::{
-    Action, Activity, ArmView, Event, FaultCode, FaultId, FaultView, Job, JobId, JobState, LeftOutView,
-    LightView, PlanView, Progress, ReadingView, RigView, RunView, SweepView, VerdictView, What,
+    Action, Activity, ArmView, Event, ExportView, FaultCode, FaultId, FaultView, Job, JobId, JobState,
+    LeftOutView, LightView, PlanView, Progress, ReadingView, RigView, RunView, SweepView, VerdictView, What,
 };
 pub use caller::{Caller, Submission};
 pub use daemon::{Daemon, Settings};

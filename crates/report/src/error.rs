@@ -36,6 +36,12 @@ pub enum ReportError {
     /// The readings of a standard do not make a calibration.
     #[error("no calibration")]
     Calibration(#[source] rig::RigError),
+    /// There is no BRDF of the run.
+    #[error("there is no BRDF of this run: {why}")]
+    NoModel {
+        /// Why.
+        why: String,
+    },
     /// This version does not accept the run's job file.
     #[error("the job file in the journal")]
     Job(#[source] sweep::SweepError),

@@ -49,6 +49,9 @@ pub(crate) fn page<'a>(
         ];
         tables.push(("Errors against the simulated specimen", error_table(&columns)));
     }
+    if !report.exports.is_empty() {
+        tables.push(("Files in other formats, read back", exports_table(report)));
+    }
     if !report.left_out.is_empty() {
         tables.push(("Left out of the plan", left_out_table(report)));
     }
@@ -167,6 +170,15 @@ fn error_table(columns: &[Metrics; 4]) -> Vec<Vec<String>> {
         table.push(std::iter::once(name.to_owned()).chain(cells).collect());
     }
     table
+}
+
+fn exports_table(report: &Report) -> Vec<Vec<String>> {
+    let head = ["format", "file", "read back"].map(str::to_owned).to_vec();
+    let rows = report.exports.iter().map(|export| {
+        let file = export.file.clone().unwrap_or_else(|| "refused".to_owned());
+        vec![export.format.to_owned(), file, export.text.clone()]
+    });
+    std::iter::once(head).chain(rows).collect()
 }
 
 fn left_out_table(report: &Report) -> Vec<Vec<String>> {

@@ -11,8 +11,9 @@ use sweep::{Job, LeftOut};
 use crate::derive::{Sweeps, truth};
 use crate::measurement::certificate;
 use crate::{
-    Adapted, Check, Measurement, ModelUncertainty, MonteCarlo, Pace, ReportError, Run, RunDirectory,
-    UncertaintySummary, Verdict, checks, measurements, outline, preview, slice, write_readings,
+    Adapted, Check, ExportedFile, Measurement, ModelUncertainty, MonteCarlo, Pace, ReportError, Run,
+    RunDirectory, UncertaintySummary, Verdict, checks, export, measurements, outline, preview, slice,
+    write_readings,
 };
 
 /// Azimuths at which the albedo of a model that is not constant along φ_p is taken.
@@ -40,6 +41,8 @@ pub struct Report {
     pub model: Option<String>,
     /// What the plan left out and why.
     pub left_out: Vec<LeftOut>,
+    /// The files in other formats for which the job asked.
+    pub exports: Vec<ExportedFile>,
     /// How long it took beside the least that its readings take; `None` where there are none.
     pub pace: Option<Pace>,
 }
@@ -86,6 +89,10 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
         directory.write("factors.csv", |file| write_factors(model, draws, file))?;
         write_model(directory, &job, model, u, &measurements)?;
     }
+    let exports = match model.as_deref() {
+        Some(model) => export::write(directory, &job, &rig, &run, model, &measurements)?,
+        None => Vec::new(),
+    };
     let errors = model.as_ref().zip(truth.as_ref()).map(|(model, truth)| {
         let estimate: &dyn Brdf = model.as_ref();
         let scene = job.scene.clone().unwrap_or_else(Scene::whole);
@@ -100,6 +107,7 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
         no_model,
         model: model.as_ref().map(|model| model.about()),
         left_out: header.plan.left_out.clone(),
+        exports,
         pace: Pace::new(&run, records, &rig),
         run,
     };
@@ -131,19 +139,19 @@ pub fn judge(records: &[Record]) -> Result<(Verdict, Vec<Check>), ReportError> {
 }
 
 /// A run with all that follows from its journal before anything is written.
-struct Examined {
-    job: Job,
-    rig: RigFile,
-    run: Run,
-    measurements: Vec<Measurement>,
+pub(crate) struct Examined {
+    pub(crate) job: Job,
+    pub(crate) rig: RigFile,
+    pub(crate) run: Run,
+    pub(crate) measurements: Vec<Measurement>,
     sweeps: Sweeps,
-    model: Option<Box<dyn Model>>,
-    no_model: Option<String>,
+    pub(crate) model: Option<Box<dyn Model>>,
+    pub(crate) no_model: Option<String>,
     checks: Vec<Check>,
 }
 
 impl Examined {
-    fn new(header: &Header, records: &[Record]) -> Result<Self, ReportError> {
+    pub(crate) fn new(header: &Header, records: &[Record]) -> Result<Self, ReportError> {
         let job = Job::parse(&header.job, "job file").map_err(ReportError::Job)?;
         let job = capture::extended_plan(records).map_or(job.clone(), |plan| job.grown(&plan));
         let rig = RigFile::parse(&header.rig, "rig file".as_ref()).map_err(ReportError::Rig)?;

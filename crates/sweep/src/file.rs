@@ -5,7 +5,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::first::first;
-use crate::{Arc, Distribution, Job, Mode, Model, Plane, SweepError};
+use crate::{Arc, Distribution, FORMATS, Job, Mode, Model, Plane, SweepError};
 
 mod scene;
 mod until;
@@ -29,6 +29,8 @@ struct RawJob {
     specimen: String,
     #[serde(default)]
     on_stage: bool,
+    #[serde(default)]
+    formats: Vec<Spanned<String>>,
     #[serde(default)]
     plane: Vec<RawPlane>,
     arc: Option<RawArc>,
@@ -144,6 +146,27 @@ impl Source<'_> {
         Err(self.refuse(Some(value.span()), key, why))
     }
 
+    /// Names of formats, each of which is known and given once.
+    fn formats(&self, names: &[Spanned<String>]) -> Result<Vec<&'static str>, SweepError> {
+        let mut found: Vec<&'static str> = Vec::new();
+        for name in names {
+            let refuse = |why: String| Err(self.refuse(Some(name.span()), "formats", why));
+            match FORMATS.iter().find(|known| *known == name.get_ref()) {
+                None => {
+                    let why = format!(
+                        "there is no format \"{}\"; there are {}",
+                        name.get_ref(),
+                        FORMATS.join(", ")
+                    );
+                    return refuse(why);
+                }
+                Some(known) if found.contains(known) => return refuse(format!("\"{known}\" is given twice")),
+                Some(known) => found.push(known),
+            }
+        }
+        Ok(found)
+    }
+
     fn readings(&self, value: &Spanned<i64>, key: impl Into<String>) -> Result<usize, SweepError> {
         let readings = self.within(value, key, &READINGS)?;
         Ok(usize::try_from(readings).expect("within 1 … 2000"))
@@ -197,6 +220,7 @@ impl Job {
             passes: raw.sweep.as_ref().map_or(Ok(1), |sweep| sweep.passes(&source))?,
             model: raw.reconstruction.model,
             scene,
+            formats: source.formats(&raw.formats)?,
             until,
         })
     }

@@ -1,6 +1,22 @@
 use pdv::{Distribution, Scene};
 use serde::{Deserialize, Serialize};
 
+/// The formats that a job may ask for; a test of `report` compares them with the crate `formats`.
+pub const FORMATS: [&str; 12] = [
+    "merl",
+    "csv-long",
+    "rgl-rgb",
+    "rgl-spectral",
+    "astm",
+    "zemax",
+    "ssdd",
+    "pab-opto",
+    "exr",
+    "exr-half-difference",
+    "materialx",
+    "gltf",
+];
+
 /// What is to be measured, from a checked job file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Job {
@@ -22,6 +38,8 @@ pub struct Job {
     pub model: Model,
     /// What will be looked at; `None`: everything.
     pub scene: Option<Scene>,
+    /// Names of the file formats in which the result is written too, each once, from [`FORMATS`].
+    pub formats: Vec<&'static str>,
     /// When to stop; `None`: when everything that the job names was measured. Else its planes and arc are the first, and
     /// what follows is decided on the way.
     pub until: Option<Until>,

@@ -26,7 +26,7 @@ pub use cell::cells;
 pub use error::SweepError;
 pub use file::{MAX_PLANES, THETA_R_DEG};
 pub use floor::floor_s;
-pub use job::{Arc, Job, Mode, Model, Plane, Until};
+pub use job::{Arc, FORMATS, Job, Mode, Model, Plane, Until};
 pub use light::Light;
 pub use mechanics::Mechanics;
 pub use pdv::{Cell, Distribution, Scene};

@@ -14,6 +14,9 @@ pub(crate) struct JobFile {
     /// Whether it lies on the stage already; otherwise someone must say so before the job starts.
     #[serde(default)]
     on_stage: bool,
+    /// Formats in which the result is written too, each once.
+    #[serde(default)]
+    formats: Vec<FormatName>,
     /// Plane sweeps, at least one; a job with a target or a budget may leave them to the program.
     #[schema(max_items = 12)]
     #[serde(default)]
@@ -129,6 +132,24 @@ enum ModeName {
     #[default]
     Step,
     Fly,
+}
+
+/// A file format.
+#[derive(Deserialize, ToSchema)]
+#[serde(rename_all = "kebab-case")]
+enum FormatName {
+    Merl,
+    CsvLong,
+    RglRgb,
+    RglSpectral,
+    Astm,
+    Zemax,
+    Ssdd,
+    PabOpto,
+    Exr,
+    ExrHalfDifference,
+    Materialx,
+    Gltf,
 }
 
 /// How d_p is distributed.

@@ -8,7 +8,7 @@ use utoipa_axum::router::OpenApiRouter;
 
 use super::problem::{MEDIA_TYPE, Problem};
 use super::shared::Shared;
-use super::{credential, events, jobs, rig, runs, session};
+use super::{credential, events, exports, jobs, rig, runs, session};
 use crate::{Action, Event};
 
 /// Path of the API; its version changes with what a client could notice.
@@ -52,6 +52,7 @@ pub(crate) fn api() -> (axum::Router<Shared>, utoipa::openapi::OpenApi) {
     let routes = OpenApiRouter::new()
         .merge(jobs::routes())
         .merge(runs::routes())
+        .merge(exports::routes())
         .merge(rig::routes())
         .merge(events::routes())
         .merge(session::routes());

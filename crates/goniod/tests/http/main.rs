@@ -5,6 +5,7 @@
 
 mod access;
 mod documents;
+mod exports;
 mod limits;
 mod manual;
 mod relay;

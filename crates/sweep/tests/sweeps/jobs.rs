@@ -157,6 +157,14 @@ fn bad_input_is_named_with_line_key_and_range() {
             "job.toml, line 5: reconstruction.model: unknown variant `magic`, expected one of `separable`, `reciprocal`, `planes`, `bivariate`, `auto`",
         ),
         (
+            format!("formats = [\"jpeg\"]\n{plane}"),
+            "job.toml, line 1: formats: there is no format \"jpeg\"; there are merl, csv-long, rgl-rgb, rgl-spectral, astm, zemax, ssdd, pab-opto, exr, exr-half-difference, materialx, gltf",
+        ),
+        (
+            format!("formats = [\n  \"astm\",\n  \"astm\",\n]\n{plane}"),
+            "job.toml, line 3: formats: \"astm\" is given twice",
+        ),
+        (
             format!("{plane}[scene]\ntheta_i_deg = [60, 0]"),
             "job.toml, line 5: scene.theta_i_deg: [60, 0] is no range within 0 … 90, the smaller first",
         ),

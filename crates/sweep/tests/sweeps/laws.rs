@@ -65,6 +65,7 @@ prop_compose! {
             passes,
             model: Model::Separable,
             scene: None,
+            formats: Vec::new(),
             until: None,
         }
     }
