@@ -82,6 +82,7 @@ fn job_file() -> Value {
     schema["title"] = json!("Job file of goniod");
     schema["$defs"]["JobFile"]["description"] =
         json!("What is to be measured. config/jobs/quickstart.toml explains every key.");
+    schema["$defs"]["JobFile"]["properties"]["formats"]["uniqueItems"] = json!(true);
     let scene = &mut schema["$defs"]["SceneTable"]["properties"];
     for range in ["theta_i_deg", "theta_o_deg"] {
         scene[range]["items"] = json!({ "type": "number", "minimum": 0, "maximum": 90 });

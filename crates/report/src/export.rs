@@ -321,6 +321,6 @@ mod tests {
         assert_eq!(name("", ""), "specimen-astm.astm");
         assert_eq!(name("../../\"\r\n\u{202e}", "2026"), "specimen-astm.astm");
         assert_eq!(name("Lack grün №5", "über"), "lack-gr-n-5-astm.astm");
-        assert_eq!(name(&"x-".repeat(90), "").len(), "-astm.astm".len() + 59 + 60);
+        assert_eq!(name(&"x-".repeat(90), "").len(), "-astm.astm".len() + 59);
     }
 }
