@@ -3,7 +3,7 @@ use std::time::SystemTime;
 
 use serde_json::json;
 use session::RunRequest;
-use sweep::{Light, Plan, Sweep, Until};
+use sweep::{LeftOut, Light, Plan, Sweep, Until};
 
 use crate::document;
 use crate::progress::clock;
@@ -92,7 +92,7 @@ fn step(step: &sweep::Step) -> serde_json::Value {
     })
 }
 
-/// A plan for people: each sweep in a line, then what is left out.
+/// Prints a plan for people: each sweep in a line, then what is left out.
 fn list(plan: &Plan, light: Light) -> std::io::Result<()> {
     let mut sweeps: Vec<(Sweep, bool, usize, f64)> = Vec::new();
     for step in &plan.steps {
@@ -139,15 +139,81 @@ fn list(plan: &Plan, light: Light) -> std::io::Result<()> {
         clock(light.foreseen_s)
     ))?;
     terminal::line(exposures(light))?;
-    for left_out in &plan.left_out {
+    left_out(plan).into_iter().try_for_each(terminal::line)
+}
+
+/// What a plan leaves out, a line each; then, by the reason, where the arms cannot be without that a reading is lost.
+fn left_out(plan: &Plan) -> Vec<String> {
+    let (lost, free): (Vec<_>, Vec<_>) = plan.left_out.iter().partition(|left_out| left_out.readings > 0);
+    let lost = lost.into_iter().map(|left_out| {
         let saved = match left_out.seconds {
             0.0 => String::new(),
             seconds => format!(", {seconds:.1} s saved"),
         };
-        terminal::line(format_args!(
+        format!(
             "left out: {} ({} readings{saved}): {}",
             left_out.what, left_out.readings, left_out.why
-        ))?;
+        )
+    });
+    let mut lines: Vec<String> = lost.collect();
+    if lines.is_empty() {
+        lines.push("every reading that the job asks for is taken".to_owned());
     }
-    Ok(())
+    let mut reasons: Vec<(&str, Vec<&str>)> = Vec::new();
+    for LeftOut { what, why, .. } in free {
+        match reasons.iter_mut().find(|(known, _)| known == why) {
+            Some((_, places)) => places.push(what),
+            None => reasons.push((why, vec![what])),
+        }
+    }
+    let reasons = reasons
+        .into_iter()
+        .map(|(why, places)| format!("no reading is lost although {why}: {}", places.join("; ")));
+    lines.extend(reasons);
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entry(what: &str, why: &str, readings: usize) -> LeftOut {
+        LeftOut {
+            what: what.to_owned(),
+            why: why.to_owned(),
+            readings,
+            seconds: 0.0,
+        }
+    }
+
+    fn plan(left_out: Vec<LeftOut>) -> Plan {
+        Plan {
+            steps: Vec::new(),
+            left_out,
+            overhead_s: 0.0,
+            closing_s: 0.0,
+            open: false,
+        }
+    }
+
+    #[test]
+    fn only_readings_that_are_not_taken_are_said_to_be_left_out() {
+        let near = "arms closer than 5.0° shadow each other";
+        let all = left_out(&plan(vec![
+            entry("plane 20°", near, 0),
+            entry("plane 45°", near, 0),
+        ]));
+        assert_eq!(
+            all,
+            [
+                "every reading that the job asks for is taken".to_owned(),
+                format!("no reading is lost although {near}: plane 20°; plane 45°"),
+            ]
+        );
+        let some = left_out(&plan(vec![entry("arc", near, 3), entry("plane 45°", near, 0)]));
+        assert_eq!(some[0], format!("left out: arc (3 readings): {near}"));
+        for line in some.iter().chain(&all) {
+            assert!(!line.contains("(0 readings)"), "{line}");
+        }
+    }
 }

@@ -263,8 +263,9 @@ pub(crate) fn bus(run: &Run) -> Check {
     let repeated = match again {
         0 => "none was taken again".to_owned(),
         n => format!(
-            "{n} more were taken with another exposure, {:.1} s of light",
-            run.seconds.again
+            "{n} more were taken with another exposure, which took {} of the {} of light of all readings",
+            seconds(run.seconds.again),
+            seconds(run.seconds.light)
         ),
     };
     Check {
@@ -275,6 +276,15 @@ pub(crate) fn bus(run: &Run) -> Check {
             run.retries
         ),
         values: json!({ "readings": run.readings, "retries": run.retries, "flags": run.flags }),
+    }
+}
+
+/// A time in words: in milliseconds where it would read as no time at all.
+fn seconds(time_s: f64) -> String {
+    match time_s {
+        short if short < 1e-3 => "less than 1 ms".to_owned(),
+        short if short < 0.95 => format!("{:.0} ms", short * 1e3),
+        long => format!("{long:.1} s"),
     }
 }
 
@@ -324,6 +334,12 @@ fn between(mut points: Vec<(f64, DVec3)>, x: f64) -> Option<DVec3> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn no_time_of_light_reads_as_none() {
+        let words = [1e-4, 0.0134, 0.94, 0.96, 8.94].map(seconds);
+        assert_eq!(words, ["less than 1 ms", "13 ms", "940 ms", "1.0 s", "8.9 s"]);
+    }
 
     #[test]
     fn light_and_sensor_may_be_swapped_in_a_reciprocal_specimen_only() {

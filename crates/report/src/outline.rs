@@ -1,6 +1,6 @@
 use brdf::Brdf;
 use pdv::{Metrics, Model};
-use sweep::Job;
+use sweep::{Job, LeftOut};
 
 use crate::derive::Sweeps;
 use crate::page::Page;
@@ -52,8 +52,12 @@ pub(crate) fn page<'a>(
     if !report.exports.is_empty() {
         tables.push(("Files in other formats, read back", exports_table(report)));
     }
-    if !report.left_out.is_empty() {
-        tables.push(("Left out of the plan", left_out_table(report)));
+    let (lost, free): (Vec<_>, Vec<_>) = report.left_out.iter().partition(|left| left.readings > 0);
+    if !lost.is_empty() {
+        tables.push(("Left out of the plan", left_out_table(&lost)));
+    }
+    if !free.is_empty() {
+        tables.push(("Limits of the arms that cost no reading", free_table(&free)));
     }
     Page {
         title: title(report),
@@ -181,15 +185,20 @@ fn exports_table(report: &Report) -> Vec<Vec<String>> {
     std::iter::once(head).chain(rows).collect()
 }
 
-fn left_out_table(report: &Report) -> Vec<Vec<String>> {
+fn left_out_table(left_out: &[&LeftOut]) -> Vec<Vec<String>> {
     let head = ["what", "readings", "seconds saved", "why"]
         .map(str::to_owned)
         .to_vec();
-    let rows = report.left_out.iter();
-    std::iter::once(head)
-        .chain(rows.map(|l| {
-            let seconds = format!("{:.1}", l.seconds);
-            vec![l.what.clone(), l.readings.to_string(), seconds, l.why.clone()]
-        }))
-        .collect()
+    let rows = left_out.iter().map(|l| {
+        let seconds = format!("{:.1}", l.seconds);
+        vec![l.what.clone(), l.readings.to_string(), seconds, l.why.clone()]
+    });
+    std::iter::once(head).chain(rows).collect()
+}
+
+/// Where the arms cannot be, or what they do not do, without that a reading is lost.
+fn free_table(left_out: &[&LeftOut]) -> Vec<Vec<String>> {
+    let head = ["where", "why"].map(str::to_owned).to_vec();
+    let rows = left_out.iter().map(|l| vec![l.what.clone(), l.why.clone()]);
+    std::iter::once(head).chain(rows).collect()
 }
