@@ -125,12 +125,34 @@ impl Client {
         self.read("/rig")
     }
 
-    /// Returns all jobs, the queue among them, in their order.
+    /// Returns the latest jobs that are over, and the queue, in their order.
     ///
     /// # Errors
     /// As [`Client::read`].
     pub fn jobs(&self) -> Result<Vec<Job>, ClientError> {
         self.read("/jobs")
+    }
+
+    /// Returns all jobs there ever were, the queue among them, in their order.
+    ///
+    /// # Errors
+    /// As [`Client::read`].
+    pub fn all_jobs(&self) -> Result<Vec<Job>, ClientError> {
+        let mut jobs: Vec<Job> = self.jobs()?;
+        let first = |jobs: &[Job]| {
+            jobs.iter()
+                .filter(|job| job.state.over())
+                .map(|job| job.place)
+                .min()
+        };
+        let mut before = first(&jobs);
+        while let Some(place) = before {
+            let earlier: Vec<Job> = self.read(&format!("/jobs?limit=200&before={place}"))?;
+            before = first(&earlier);
+            jobs.extend(earlier);
+        }
+        jobs.sort_by_key(|job| job.place);
+        Ok(jobs)
     }
 
     /// Returns one job.

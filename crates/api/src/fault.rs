@@ -39,6 +39,9 @@ pub struct FaultView {
     pub code: FaultCode,
     /// What happened, with its causes.
     pub text: String,
+    /// What to do about it, as docs/operating.md says; `None` where a version before kept it.
+    #[serde(default)]
+    pub remedy: Option<String>,
     /// When, RFC 3339, UTC.
     pub at: String,
     /// The run that it ended.

@@ -73,6 +73,9 @@ pub struct Job {
     /// was measured, but the result must not be used.
     #[serde(default)]
     pub verdict: Option<VerdictView>,
+    /// Whether its run directory gets all files, also the large ones that can be made when somebody asks for them.
+    #[serde(default)]
+    pub whole: bool,
     /// Who submitted it.
     pub by: String,
     /// When it was submitted, RFC 3339, UTC.

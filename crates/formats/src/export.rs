@@ -67,6 +67,8 @@ pub struct Metadata {
     pub wavelengths_nm: [f64; 3],
     /// What is known of the uncertainty, in words; empty where nothing is.
     pub uncertainty: String,
+    /// What else the record of the run says, such as material, operator and rig: name and value.
+    pub record: Vec<(&'static str, String)>,
 }
 
 impl Default for Metadata {
@@ -81,6 +83,7 @@ impl Default for Metadata {
             solid_angle_sr: None,
             wavelengths_nm: Self::WAVELENGTHS_NM,
             uncertainty: String::new(),
+            record: Vec::new(),
         }
     }
 }
@@ -109,6 +112,7 @@ impl Metadata {
             ("uncertainty", clean(&self.uncertainty)),
         ]
         .into_iter()
+        .chain(self.record.iter().map(|(name, value)| (*name, clean(value))))
         .filter(|(_, value)| !value.is_empty())
         .collect()
     }

@@ -55,5 +55,10 @@ fn confirmed(daemon: &Client) -> anyhow::Result<FaultId> {
 }
 
 fn described(fault: &FaultView) -> String {
-    format!("fault {} of {}: {}", fault.id, fault.at, fault.text)
+    let remedy = fault
+        .remedy
+        .as_deref()
+        .map(|remedy| format!("\nwhat to do: {remedy}"));
+    let remedy = remedy.unwrap_or_default();
+    format!("fault {} of {}: {}{remedy}", fault.id, fault.at, fault.text)
 }

@@ -53,7 +53,7 @@ impl Errand {
             return Ok(None);
         }
         free(&daemon)?;
-        let job = queue::hand_in(&daemon, job)?.id;
+        let job = queue::hand_in(&daemon, job, true)?.id;
         start(&daemon, job)?;
         Ok(Some(Self {
             daemon: Arc::new(daemon),

@@ -11,7 +11,7 @@ use crate::error::CommandError;
 /// # Errors
 /// The file cannot be read, or is wrong; the daemon does not answer, or refuses.
 pub(crate) fn submit(daemon: &Client, file: &Path, as_json: bool) -> anyhow::Result<()> {
-    let job = hand_in(daemon, file)?;
+    let job = hand_in(daemon, file, false)?;
     if as_json {
         return Ok(document::QUEUED.print(&job)?);
     }
@@ -19,13 +19,15 @@ pub(crate) fn submit(daemon: &Client, file: &Path, as_json: bool) -> anyhow::Res
     Ok(terminal::line(job.id)?)
 }
 
-/// Hands in a job file.
+/// Hands in a job file. A `whole` run directory gets all files, also the large ones that the daemon makes when somebody
+/// asks for them.
 ///
 /// # Errors
 /// As [`submit`].
-pub(crate) fn hand_in(daemon: &Client, file: &Path) -> anyhow::Result<Job> {
+pub(crate) fn hand_in(daemon: &Client, file: &Path, whole: bool) -> anyhow::Result<Job> {
     let text = session::job_text(file)?;
-    let path = format!("/jobs?name={}", encoded(&file.to_string_lossy()));
+    let whole = if whole { "&whole=true" } else { "" };
+    let path = format!("/jobs?name={}{whole}", encoded(&file.to_string_lossy()));
     Ok(daemon.hand_in(&path, "application/toml", &text)?)
 }
 
@@ -34,7 +36,10 @@ pub(crate) fn hand_in(daemon: &Client, file: &Path) -> anyhow::Result<Job> {
 /// # Errors
 /// The daemon does not answer, or refuses.
 pub(crate) fn jobs(daemon: &Client, all: bool, as_json: bool) -> anyhow::Result<()> {
-    let mut jobs = daemon.jobs()?;
+    let mut jobs = match all {
+        true => daemon.all_jobs()?,
+        false => daemon.jobs()?,
+    };
     jobs.retain(|job| all || !job.state.over());
     if as_json {
         return Ok(document::QUEUE.print(&json!({ "jobs": jobs }))?);

@@ -5,6 +5,8 @@ pub struct Submission {
     pub job: String,
     /// What messages call it.
     pub name: String,
+    /// Whether the run directory gets all files, also the large ones that can be made when somebody asks for them.
+    pub whole: bool,
 }
 
 /// Who asks.

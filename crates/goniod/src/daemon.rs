@@ -5,12 +5,15 @@ use std::time::SystemTime;
 use arms::{Arm, ArmAngle};
 use capture::{Command, FileJournal, Record};
 use formats::Format;
-use report::{RunDirectory, RunExport};
+use report::{RunDirectory, RunExport, Volume};
 use rig::RigFile;
 use tokio::sync::{mpsc, oneshot, watch};
 
+mod runs;
+
 use crate::audit::Audit;
 use crate::event::Log;
+use crate::history;
 use crate::lock::Lock;
 use crate::operator::{NotKept, OperatorControl};
 use crate::queue::{Queue, Request};
@@ -19,8 +22,8 @@ use crate::shared::Shared;
 use crate::strays::RunDirectories;
 use crate::worker::{RigWorker, WorkerPlace};
 use crate::{
-    Action, Caller, DaemonError, Events, FaultId, Job, JobId, PlanView, PortOfFile, ReadingView, Refusal,
-    RefusalKind, RigSource, RigView, RunView, Sqlite, Store, Submission,
+    Action, Caller, DaemonError, Event, Events, FaultId, Job, JobId, PlanView, PortOfFile, ReadingView,
+    Refusal, RefusalKind, RigSource, RigView, RunView, Sqlite, Store, Submission,
 };
 use session::RunRequest;
 
@@ -30,8 +33,6 @@ pub(crate) const STORE: &str = "goniod.db";
 const REQUESTS: usize = 64;
 /// Events of the worker that may wait for the queue.
 const WORKER_EVENTS: usize = 8;
-/// Most jobs that are over, and most runs, in one answer.
-const LISTED: u32 = 500;
 /// Most bytes of a job file.
 const JOB_BYTES: usize = 64 * 1024;
 /// Ids of events in one life of the daemon.
@@ -110,6 +111,7 @@ impl Daemon {
         let now = humantime::format_rfc3339_millis((settings.clock)()).to_string();
         let life = store.begin_life(&now).await?;
         let latched = store.latched().await?;
+        runs::clear(&settings.data);
         let view = watch::Sender::new(crate::view::unknown_rig(&rig));
         let log = Arc::new(Log::new(life * EVENTS_PER_LIFE));
         let operator = OperatorControl::open(
@@ -128,6 +130,7 @@ impl Daemon {
             log,
             holding: watch::Sender::new(false),
             unkept: Mutex::default(),
+            making: tokio::sync::Mutex::default(),
             rig,
         });
         let (requests, asked) = mpsc::channel(REQUESTS);
@@ -149,9 +152,11 @@ impl Daemon {
     /// A job file that is wrong, or that this rig cannot do; too many waiting.
     pub async fn submit(&self, by: &Caller, submission: Submission) -> Result<Job, Refusal> {
         let receipt = self.shared.operator.receive();
+        let whole = submission.whole;
         let order = self.order(submission.job, submission.name).await?;
         self.ask(by, |reply| Request::Submit {
             order: Box::new(order),
+            whole,
             receipt,
             reply,
         })
@@ -200,7 +205,27 @@ impl Daemon {
     /// # Errors
     /// The store cannot be read.
     pub async fn jobs(&self) -> Result<Vec<Job>, Refusal> {
-        let jobs = self.shared.store.jobs(LISTED).await?;
+        let mut jobs = self.waiting_jobs().await?;
+        jobs.extend(self.jobs_over(None, history::USUAL).await?);
+        Ok(jobs)
+    }
+
+    /// Jobs that are not over, in the order of the queue.
+    ///
+    /// # Errors
+    /// The store cannot be read.
+    pub async fn waiting_jobs(&self) -> Result<Vec<Job>, Refusal> {
+        let jobs = self.shared.store.waiting_jobs().await?;
+        Ok(jobs.into_iter().map(|job| self.shared.latest(job)).collect())
+    }
+
+    /// The latest so many jobs that are over, of those before a place where one is named, the latest first.
+    ///
+    /// # Errors
+    /// More than 200, or none, are wanted; the store cannot be read.
+    pub async fn jobs_over(&self, before: Option<u64>, most: u32) -> Result<Vec<Job>, Refusal> {
+        history::limit(most)?;
+        let jobs = self.shared.store.jobs_over(before, most).await?;
         Ok(jobs.into_iter().map(|job| self.shared.latest(job)).collect())
     }
 
@@ -334,12 +359,10 @@ impl Daemon {
         Events::new(self.shared.log.clone(), after)
     }
 
-    /// The latest runs, newest first.
-    ///
-    /// # Errors
-    /// The store cannot be read.
-    pub async fn runs(&self) -> Result<Vec<RunView>, Refusal> {
-        Ok(self.shared.store.runs(LISTED).await?)
+    /// The latest so many events that are worth telling later, oldest first: what became of jobs, warnings, faults; of
+    /// this start of the daemon.
+    pub fn latest_events(&self, most: usize) -> Vec<Event> {
+        self.shared.log.latest(most)
     }
 
     /// One run.
@@ -372,7 +395,7 @@ impl Daemon {
     pub async fn rebuild(&self, id: &str) -> Result<RunView, Refusal> {
         let directory = RunDirectory::at(self.run(id).await?.directory);
         let records = self.records(id).await?;
-        let report = blocking(move || write(&directory, &records))
+        let report = blocking(move || write(&directory, &records, Volume::Whole))
             .await?
             .map_err(|error| Refusal::unavailable(chain(&error)))?;
         let verdict = crate::view::verdict(report.verdict);
@@ -482,13 +505,14 @@ impl<T> Reply<T> {
 pub(crate) fn write(
     directory: &RunDirectory,
     records: &[Record],
+    volume: Volume,
 ) -> Result<report::Report, report::ReportError> {
     std::fs::create_dir_all(directory.path()).map_err(|source| report::ReportError::Write {
         path: directory.path().to_owned(),
         source,
     })?;
     directory.write("journal", |file| FileJournal::copy(records, file))?;
-    report::write(directory, records)
+    report::write_volume(directory, records, volume)
 }
 
 async fn blocking<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Refusal> {

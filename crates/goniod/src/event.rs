@@ -8,10 +8,15 @@ use crate::{Event, What};
 /// Events that are kept for whoever comes back.
 const KEPT: usize = 4096;
 
+/// Events worth telling later that are kept for whoever opens the page.
+pub(crate) const TOLD: usize = 100;
+
 /// The events that are kept, shared by all who watch.
 #[derive(Debug)]
 pub(crate) struct Log {
     kept: Mutex<VecDeque<Event>>,
+    /// The latest of those that are worth telling later: the many of a run's steps do not push them out.
+    told: Mutex<VecDeque<Event>>,
     last: watch::Sender<Last>,
 }
 
@@ -28,6 +33,7 @@ impl Log {
     pub(crate) fn new(before: u64) -> Self {
         Self {
             kept: Mutex::new(VecDeque::new()),
+            told: Mutex::new(VecDeque::new()),
             last: watch::Sender::new(Last {
                 id: before,
                 closed: false,
@@ -42,9 +48,26 @@ impl Log {
         if kept.len() == KEPT {
             kept.pop_front();
         }
-        kept.push_back(Event { id, at, what });
+        let event = Event { id, at, what };
+        if worth_telling(&event.what) {
+            let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+            if told.len() == TOLD {
+                told.pop_front();
+            }
+            told.push_back(event.clone());
+        }
+        kept.push_back(event);
         // Before another one is let in: two events must not have one id, or whoever reads misses the second.
         self.last.send_modify(|last| last.id = id);
+    }
+
+    /// The latest so many events that are worth telling later, oldest first.
+    pub(crate) fn latest(&self, most: usize) -> Vec<Event> {
+        let told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        told.iter()
+            .skip(told.len().saturating_sub(most))
+            .cloned()
+            .collect()
     }
 
     /// Lets everyone know that nothing comes any more.
@@ -65,6 +88,22 @@ impl Log {
             at: event.at.clone(),
             what: What::Gap,
         })
+    }
+}
+
+/// Whether somebody who comes later wants to know of it, rather than only how far the rig is now.
+fn worth_telling(what: &What) -> bool {
+    match what {
+        What::Job { .. }
+        | What::Repeat { .. }
+        | What::Warning { .. }
+        | What::Fault { .. }
+        | What::Acknowledged { .. } => true,
+        What::Activity { .. }
+        | What::Step { .. }
+        | What::Reading { .. }
+        | What::Progress { .. }
+        | What::Gap => false,
     }
 }
 
@@ -122,6 +161,24 @@ mod tests {
         });
         let ids: Vec<u64> = log.kept.lock().unwrap().iter().map(|event| event.id).collect();
         assert_eq!(ids, (1..=EACH).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn what_happened_is_told_to_whoever_comes_later_however_many_steps_followed() {
+        let log = Log::new(0);
+        for n in 0..TOLD + 3 {
+            log.publish(String::new(), warning(n));
+        }
+        for _ in 0..2 * KEPT {
+            let activity = crate::Activity::Running;
+            log.publish(String::new(), What::Activity { activity });
+        }
+        let latest = log.latest(2);
+        assert_eq!(
+            latest.iter().map(|event| &event.what).collect::<Vec<_>>(),
+            [&warning(TOLD + 1), &warning(TOLD + 2)]
+        );
+        assert_eq!(log.latest(usize::MAX).len(), TOLD);
     }
 
     #[tokio::test]

@@ -9,12 +9,14 @@ mod caller;
 mod daemon;
 mod error;
 mod event;
+mod history;
 pub mod http;
 mod lock;
 mod operator;
 mod queue;
 mod rebuild;
 mod refusal;
+mod remedy;
 mod service;
 mod shared;
 mod store;
@@ -24,12 +26,14 @@ mod worker;
 
 pub use api::{
     Action, Activity, ArmView, Event, ExportView, FaultCode, FaultId, FaultView, Job, JobId, JobState,
-    LeftOutView, LightView, PlanView, Progress, ReadingView, RigView, RunView, SweepView, VerdictView, What,
+    LeftOutView, LightView, PlanView, Progress, ReadingView, RecordEdit, RecordView, RigView, RunView,
+    SweepView, VerdictView, What,
 };
 pub use caller::{Caller, Submission};
 pub use daemon::{Daemon, Settings};
 pub use error::DaemonError;
 pub use event::Events;
+pub use history::RunQuery;
 pub use rebuild::rebuild;
 pub use refusal::{Refusal, RefusalKind};
 pub use service::{command, main};

@@ -5,6 +5,7 @@ use capture::Command;
 use tokio::sync::watch;
 
 use crate::event::Log;
+use crate::remedy::remedy;
 use crate::{Caller, FaultCode, FaultId, FaultView, Refusal, RigView, What};
 
 mod permit;
@@ -465,6 +466,7 @@ fn fault(code: FaultCode, text: String, run: Option<String>, at: SystemTime) -> 
     FaultView {
         id: FaultId::generate(),
         code,
+        remedy: Some(remedy(code, &text)),
         text,
         at: humantime::format_rfc3339_millis(at).to_string(),
         run,

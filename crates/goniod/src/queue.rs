@@ -41,7 +41,7 @@ impl Queue {
         worker: mpsc::Sender<Task>,
         lock: Lock,
     ) -> Result<Self, DaemonError> {
-        let mut jobs = shared.store.jobs(0).await?;
+        let mut jobs = shared.store.waiting_jobs().await?;
         for job in jobs.iter_mut().filter(|job| job.state.under_way()) {
             let Some(state) = job.state.after(Cause::Interrupt) else {
                 continue;

@@ -38,5 +38,6 @@ pub async fn rebuild(directory: &Path) -> Result<Option<Report>, DaemonError> {
     Ok(Some(crate::daemon::write(
         &RunDirectory::at(directory),
         &records,
+        report::Volume::Whole,
     )?))
 }

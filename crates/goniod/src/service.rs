@@ -332,7 +332,7 @@ async fn watchdog(daemon: &Daemon) {
     let mut every = tokio::time::interval(limit / 3);
     loop {
         every.tick().await;
-        match tokio::time::timeout(limit / 3, daemon.jobs()).await {
+        match tokio::time::timeout(limit / 3, daemon.waiting_jobs()).await {
             Ok(_) => notify(&[NotifyState::Watchdog]),
             Err(_) => tracing::error!("the store does not answer"),
         }

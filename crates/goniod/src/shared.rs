@@ -24,6 +24,8 @@ pub(crate) struct Shared {
     pub(crate) holding: watch::Sender<bool>,
     pub(crate) view: watch::Sender<RigView>,
     pub(crate) log: Arc<Log>,
+    /// Held while a file of a run is made that somebody asked for.
+    pub(crate) making: tokio::sync::Mutex<()>,
     /// Jobs as they are, where the store refused to keep how they changed.
     pub(crate) unkept: Mutex<HashMap<JobId, Job>>,
 }

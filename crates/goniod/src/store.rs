@@ -3,7 +3,7 @@ use std::path::PathBuf;
 use async_trait::async_trait;
 use capture::Record;
 
-use crate::{FaultCode, FaultView, Job, JobId, RunView, VerdictView};
+use crate::{FaultCode, FaultView, Job, JobId, RunQuery, RunView, VerdictView};
 
 mod journal;
 mod memory;
@@ -48,17 +48,41 @@ pub trait Store: Send + Sync + 'static {
     /// The medium refused, or what it holds is not a job.
     async fn job(&self, id: JobId) -> Result<Option<Job>, StoreError>;
 
-    /// Jobs that are not over, in the order of the queue, then the latest so many that are.
+    /// Jobs that are not over, in the order of the queue.
     ///
     /// # Errors
     /// As [`Self::job`].
-    async fn jobs(&self, over: u32) -> Result<Vec<Job>, StoreError>;
+    async fn waiting_jobs(&self) -> Result<Vec<Job>, StoreError>;
 
-    /// Begins a run with the first record of its journal, and ties its job to it.
+    /// The latest so many jobs that are over, of those before a place where one is named, the latest first.
+    ///
+    /// # Errors
+    /// As [`Self::job`].
+    async fn jobs_over(&self, before: Option<u64>, most: u32) -> Result<Vec<Job>, StoreError>;
+
+    /// Begins a run with the first record of its journal, ties its job to it, and sets its place.
     ///
     /// # Errors
     /// The medium refused.
-    async fn begin_run(&self, run: &RunView, header: &Record) -> Result<(), StoreError>;
+    async fn begin_run(&self, run: &mut RunView, header: &Record) -> Result<(), StoreError>;
+
+    /// Keeps what is said of a run: the name of its specimen and its record.
+    ///
+    /// # Errors
+    /// The medium refused.
+    async fn describe_run(&self, run: &RunView) -> Result<(), StoreError>;
+
+    /// Puts a run away, or takes it back into the history.
+    ///
+    /// # Errors
+    /// The medium refused.
+    async fn archive_run(&self, run: &str, at: Option<&str>) -> Result<(), StoreError>;
+
+    /// Forgets a run with its journal; its job stays and has no run.
+    ///
+    /// # Errors
+    /// The medium refused.
+    async fn delete_run(&self, run: &str) -> Result<(), StoreError>;
 
     /// Notes when a run's files were written, and what its checks said.
     ///
@@ -66,11 +90,11 @@ pub trait Store: Send + Sync + 'static {
     /// The medium refused.
     async fn reported(&self, run: &str, at: &str, verdict: VerdictView) -> Result<(), StoreError>;
 
-    /// The latest so many runs, newest first.
+    /// The runs that somebody wants to see, newest first.
     ///
     /// # Errors
     /// The medium refused, or what it holds is not a run.
-    async fn runs(&self, most: u32) -> Result<Vec<RunView>, StoreError>;
+    async fn runs(&self, query: &RunQuery) -> Result<Vec<RunView>, StoreError>;
 
     /// One run.
     ///

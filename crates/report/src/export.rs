@@ -231,13 +231,18 @@ fn metadata(job: &Job, rig: &RigFile, run: &Run, measurements: &[Measurement]) -
     let [light_rad, sensor_rad] = rig.uncertainty.apertures_rad;
     let half_angles = [light_rad, sensor_rad].map(|rad| (rad.to_degrees() * 1e6).round() / 1e6);
     Metadata {
-        specimen: job.specimen.clone(),
+        specimen: job.specimen.name.clone(),
         date: run.started.clone(),
         instrument: format!("goniod {}", run.version),
         run: run.id.clone(),
         apertures_deg: Some(half_angles),
         solid_angle_sr: (sensor_rad > 0.0).then(|| PI * sensor_rad.sin().powi(2)),
         uncertainty: uncertainty(measurements),
+        record: run
+            .record()
+            .into_iter()
+            .map(|(key, _, value)| (key, value))
+            .collect(),
         ..Metadata::default()
     }
 }

@@ -43,7 +43,9 @@ pub use page::escape;
 pub use picture::Picture;
 pub use preview::{EXPOSURE as SPHERE_EXPOSURE, sphere};
 pub use readings::write_readings;
-pub use report::{Report, judge, reconstruct, write};
-pub use run::{Given, Readings, Run, Seconds, State, Used, flag_name};
+pub use report::{
+    LARGE, LARGE_BYTES, Report, UNCERTAINTY, Volume, judge, reconstruct, write, write_large, write_volume,
+};
+pub use run::{Given, GivenRig, Readings, Run, Seconds, State, Used, flag_name};
 pub use standard::{Standard, WhiteReference};
 pub use uncertainty::COVERAGE;

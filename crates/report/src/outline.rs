@@ -122,6 +122,8 @@ fn facts(report: &Report) -> Vec<(&'static str, String)> {
         ("Devices", devices.join(", ")),
         ("Program", format!("goniod {}", run.version)),
     ];
+    let record = run.record().into_iter();
+    facts.extend(record.map(|(_, label, value)| (label, value)));
     let expected = report.adapted.as_ref().and_then(|adapted| adapted.expected_male);
     facts.extend(expected.map(|male| {
         let found = report.errors.and_then(|errors| errors.overall.male);

@@ -47,6 +47,22 @@ pub struct Report {
     pub pace: Option<Pace>,
 }
 
+/// Files of a run directory that take nearly all of its room, and that [`write_large`] makes again at any time.
+pub const LARGE: [&str; 2] = ["brdf.binary", "brdf.uncertainty.binary"];
+/// Bytes of each of them: a MERL table is of one size.
+pub const LARGE_BYTES: u64 = 12 + 8 * 3 * 90 * 90 * 180;
+/// The file that says what the reconstruction's uncertainty is; there is one where there is a reconstruction.
+pub const UNCERTAINTY: &str = "brdf.uncertainty.json";
+
+/// What of a run directory is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Volume {
+    /// Everything.
+    Whole,
+    /// All but the files of [`LARGE`].
+    WithoutLarge,
+}
+
 /// Makes everything in a run directory again from its journal.
 ///
 /// # Errors
@@ -61,6 +77,42 @@ pub fn reconstruct(directory: &RunDirectory) -> Result<Report, ReportError> {
 /// # Errors
 /// Records without a header; a job or rig file that this version does not accept; a file that cannot be written.
 pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, ReportError> {
+    write_volume(directory, records, Volume::Whole)
+}
+
+/// Makes one file of [`LARGE`] from the records of a journal; nothing where the run has no reconstruction.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_large(directory: &RunDirectory, records: &[Record], name: &str) -> Result<(), ReportError> {
+    let Some(Record::Header(header)) = records.first() else {
+        return Err(ReportError::NoHeader {
+            path: directory.journal(),
+        });
+    };
+    let examined = Examined::new(header, records)?;
+    let Some(model) = examined.model.as_deref() else {
+        return Ok(());
+    };
+    let (job, sweeps) = (&examined.job, &examined.sweeps);
+    if name == LARGE[0] {
+        let f = table(job, model, model);
+        return directory.write(name, |file| f.write_to(file));
+    }
+    let draws = MonteCarlo::new(job, &examined.measurements, records, &examined.rig);
+    let u = table(job, model, &ModelUncertainty::new(model, sweeps, &draws));
+    directory.write(name, |file| u.write_to(file))
+}
+
+/// Writes what follows from the records of a journal into its run directory, as [`write()`], but for what is left out.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_volume(
+    directory: &RunDirectory,
+    records: &[Record],
+    volume: Volume,
+) -> Result<Report, ReportError> {
     let Some(Record::Header(header)) = records.first() else {
         return Err(ReportError::NoHeader {
             path: directory.journal(),
@@ -87,7 +139,7 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
     let uncertainty = made.map(|(model, draws)| ModelUncertainty::new(model, &sweeps, draws));
     if let (Some((model, draws)), Some(u)) = (made, &uncertainty) {
         directory.write("factors.csv", |file| write_factors(model, draws, file))?;
-        write_model(directory, &job, model, u, &measurements)?;
+        write_model(directory, &job, model, u, &measurements, volume)?;
     }
     let exports = match model.as_deref() {
         Some(model) => export::write(directory, &job, &rig, &run, model, &measurements)?,
@@ -99,7 +151,7 @@ pub fn write(directory: &RunDirectory, records: &[Record]) -> Result<Report, Rep
         compare_within(&scene, truth, &[estimate], &Draw::default()).remove(0)
     });
     let report = Report {
-        specimen: job.specimen.clone(),
+        specimen: job.specimen.name.clone(),
         verdict: run.verdict,
         checks,
         errors,
@@ -199,22 +251,30 @@ fn write_model(
     model: &dyn Model,
     uncertainty: &ModelUncertainty<'_>,
     measurements: &[Measurement],
+    volume: Volume,
 ) -> Result<(), ReportError> {
-    let table = |of: &dyn Brdf| match &job.scene {
-        Some(scene) => MerlTable::fill(&Asked { of, model, scene }),
-        None => MerlTable::fill(of),
-    };
-    let (f, u) = (table(model), table(uncertainty));
-    directory.write("brdf.binary", |file| f.write_to(file))?;
-    directory.write("brdf.uncertainty.binary", |file| u.write_to(file))?;
+    let (f, u) = (table(job, model, model), table(job, model, uncertainty));
+    if volume == Volume::Whole {
+        for (name, table) in LARGE.into_iter().zip([&f, &u]) {
+            directory.write(name, |file| table.write_to(file))?;
+        }
+    }
     let summary = UncertaintySummary::new(&f, &u, measurements);
-    directory.write("brdf.uncertainty.json", |file| json(file, &summary))?;
+    directory.write(UNCERTAINTY, |file| json(file, &summary))?;
     directory.write("slice.exr", |file| slice::write(model, file))?;
     let sphere = preview::sphere(model);
     directory.write("preview.exr", |file| sphere.write_exr(file, &preview::ATTRIBUTES))?;
     directory.write("preview.png", |file| {
         file.write_all(&sphere.png(preview::EXPOSURE)?)
     })
+}
+
+/// A model, or its uncertainty, as a table: of a job's scene where it has one.
+fn table(job: &Job, model: &dyn Model, of: &dyn Brdf) -> MerlTable {
+    match &job.scene {
+        Some(scene) => MerlTable::fill(&Asked { of, model, scene }),
+        None => MerlTable::fill(of),
+    }
 }
 
 /// What a table holds of a scene: −1, as MERL marks what is not valid, outside of it and in channels that nobody asked for.

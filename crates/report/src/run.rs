@@ -1,9 +1,10 @@
 use std::collections::BTreeMap;
 
 use capture::{Flag, Header, Outcome, Reading, Record};
-use rig::{Certificate, Conditions, Identity};
+use rig::{Certificate, Conditions, Identity, RigFile};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
+use sweep::{Job, Specimen};
 
 use crate::Verdict;
 
@@ -28,6 +29,34 @@ pub struct Given {
     pub sha256: String,
     /// The file as given.
     pub text: String,
+}
+
+/// The rig file of the journal's header, with what it says of the rig for the record.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct GivenRig {
+    /// The file.
+    #[serde(flatten)]
+    pub file: Given,
+    /// What the rig is called; empty where the file does not say.
+    pub name: String,
+    /// Its number, likewise.
+    pub id: String,
+    /// Where it stands, likewise.
+    pub location: String,
+}
+
+impl GivenRig {
+    fn new(text: &str) -> Self {
+        // A file that is not accepted any more says nothing here; whoever needs more of it tells what is wrong.
+        let file = RigFile::parse(text, "rig file".as_ref()).ok();
+        let about = file.map(|file| file.about).unwrap_or_default();
+        Self {
+            file: Given::new(text),
+            name: about.name,
+            id: about.id,
+            location: about.location,
+        }
+    }
 }
 
 impl Given {
@@ -89,7 +118,13 @@ pub struct Run {
     /// The job file.
     pub job: Given,
     /// The rig file.
-    pub rig: Given,
+    pub rig: GivenRig,
+    /// What was measured.
+    pub specimen: Specimen,
+    /// Who measured, as the job file says; empty where it does not.
+    pub operator: String,
+    /// What it was measured for, likewise.
+    pub project: String,
     /// The stored calibration that was used.
     pub calibration: Option<Used>,
     /// Light servo, sensor servo, photometer, as they answered last.
@@ -209,6 +244,29 @@ impl Run {
         run
     }
 
+    /// What is said of specimen, people and rig beside the specimen's name: key, label, value; only what is said.
+    pub fn record(&self) -> Vec<(&'static str, &'static str, String)> {
+        let named = |name: &str, id: &str| match (name, id) {
+            (name, "") => name.to_owned(),
+            ("", id) => id.to_owned(),
+            (name, id) => format!("{name} ({id})"),
+        };
+        let Self { specimen, rig, .. } = self;
+        [
+            ("specimen_id", "Specimen's number", specimen.id.clone()),
+            ("material", "Material", specimen.material.clone()),
+            ("tags", "Tags", specimen.tags.join(", ")),
+            ("notes", "Notes", specimen.notes.clone()),
+            ("operator", "Operator", self.operator.clone()),
+            ("project", "Project", self.project.clone()),
+            ("rig", "Rig", named(&rig.name, &rig.id)),
+            ("location", "Where it stands", rig.location.clone()),
+        ]
+        .into_iter()
+        .filter(|(_, _, value)| !value.is_empty())
+        .collect()
+    }
+
     /// Notes what the checks say of the result as a whole.
     pub(crate) fn judge(&mut self, verdict: Verdict) {
         self.verdict = verdict;
@@ -223,7 +281,16 @@ impl Run {
     }
 
     fn begun(header: &Header) -> Self {
+        // As of the rig file.
+        let job = Job::parse(&header.job, "job file").ok();
+        let (operator, project) = job
+            .as_ref()
+            .map(|job| (job.operator.clone(), job.project.clone()))
+            .unwrap_or_default();
         Self {
+            specimen: job.map(|job| job.specimen).unwrap_or_default(),
+            operator,
+            project,
             id: header.run.clone(),
             state: State::Interrupted,
             verdict: Verdict::Unknown,
@@ -231,7 +298,7 @@ impl Run {
             fault: None,
             version: header.version.clone(),
             job: Given::new(&header.job),
-            rig: Given::new(&header.rig),
+            rig: GivenRig::new(&header.rig),
             calibration: header.certificate.as_deref().map(Used::new),
             identities: Vec::new(),
             started: header.started.clone(),
@@ -383,6 +450,41 @@ mod tests {
             (3, 2, 6)
         );
         assert_eq!(run.flags["saturated"], 1);
+    }
+
+    #[test]
+    fn a_run_says_of_what_by_whom_and_on_which_rig() {
+        let plane = "[[plane]]\ntheta_r_deg = 60\nreadings = 6\n";
+        let header = |job: &str, rig: &str| Header {
+            job: format!("{job}\n{plane}"),
+            rig: rig.to_owned(),
+            ..header()
+        };
+        let job =
+            "[specimen]\nname = \"blue\"\nid = \"L-4\"\ntags = [\"a\", \"b\"]\n[run]\noperator = \"Meier\"";
+        let run = Run::new(&header(job, "[rig]\nname = \"North\"\nid = \"R1\""), &[]);
+        let record = run.record();
+        let record: Vec<_> = record
+            .iter()
+            .map(|(key, _, value)| (*key, value.as_str()))
+            .collect();
+        assert_eq!(
+            record,
+            [
+                ("specimen_id", "L-4"),
+                ("tags", "a, b"),
+                ("operator", "Meier"),
+                ("rig", "North (R1)")
+            ]
+        );
+        let json = serde_json::to_value(&run).unwrap();
+        assert_eq!(json["specimen"]["name"], "blue");
+        assert_eq!(
+            (&json["rig"]["name"], &json["operator"]),
+            (&"North".into(), &"Meier".into())
+        );
+        assert!(json["rig"]["sha256"].is_string(), "as before");
+        assert!(Run::new(&header("specimen = \"x\"", ""), &[]).record().is_empty());
     }
 
     #[test]

@@ -18,6 +18,8 @@ mod tests;
 /// Every key, its unit, default and range stand in config/rig.toml, which is also the built-in default.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RigFile {
+    /// What the rig is called.
+    pub about: About,
     /// The serial bus.
     pub bus: BusSettings,
     /// Light and sensor arm, in this order.
@@ -43,6 +45,17 @@ pub struct RigFile {
     /// SHA-256, hexadecimal, of everything in the file that a calibration depends on: arms, photometer, filling and
     /// constants, with the defaults filled in.
     pub fingerprint: String,
+}
+
+/// `[rig]`: what the rig is called and where it stands, for the record of each run; empty where nothing is said.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct About {
+    /// Its name.
+    pub name: String,
+    /// Its number in whatever list it stands.
+    pub id: String,
+    /// Where it stands.
+    pub location: String,
 }
 
 /// `[suspend]`: when a run holds by itself, and goes on.

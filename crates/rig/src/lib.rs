@@ -31,8 +31,8 @@ pub use dynamixel::{Adapter, Dynamixel, Usb, ports};
 pub use error::{Place, RigError};
 pub use fault::{Device, Fault, FaultKind};
 pub use file::{
-    Approach, ArmSettings, Band, BusSettings, Certificates, Estop, MotionSettings, PhotometerSettings, Port,
-    RigFile, Suspend, Uncertainties, Visits,
+    About, Approach, ArmSettings, Band, BusSettings, Certificates, Estop, MotionSettings, PhotometerSettings,
+    Port, RigFile, Suspend, Uncertainties, Visits,
 };
 pub use rig::{Observation, Rig, Snapshot};
 pub use surroundings::Surroundings;

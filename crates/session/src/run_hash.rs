@@ -14,7 +14,8 @@ impl RunRequest {
     /// It is another one whenever what would be measured, or how, is another: it is made of what job and rig file say, with
     /// defaults filled in, of the plan, of the file that lies on the simulator's stage, of the stored calibration where the
     /// rig file asks for one, and of the version of this program. Comments, white space, the order of keys and the names of
-    /// the files make no difference, nor does the simulator's table where the rig is a real one.
+    /// the files make no difference, nor does what the rig is called, who measures and what for, nor the simulator's table
+    /// where the rig is a real one.
     ///
     /// # Errors
     /// The specimen's file cannot be read; the rig file asks for a stored calibration and there is no valid one.
@@ -23,9 +24,13 @@ impl RunRequest {
             name: String::new(),
             // It says when a job begins, not what it measures.
             on_stage: false,
+            // Nor do these.
+            operator: String::new(),
+            project: String::new(),
             ..self.job.clone()
         };
         let mut rig = self.rig.clone();
+        rig.about = rig::About::default();
         let sim = match rig.bus.port {
             Port::Sim => std::mem::take(&mut rig.sim),
             Port::Path(_) => toml::Table::new(),
@@ -190,7 +195,8 @@ mod tests {
         let parse = |text: &str| rig::RigFile::parse(text, "rig.toml".as_ref());
         let plain = parse("").unwrap();
         let mut tried = 0;
-        for (name, table) in &built_in() {
+        // What a rig is called makes it no other one.
+        for (name, table) in built_in().iter().filter(|(name, _)| *name != "rig") {
             for (key, value) in table.as_table().unwrap() {
                 for other in others(value) {
                     let text = format!("{name}.{key} = {other}\n");
@@ -235,6 +241,14 @@ mod tests {
         let one = hash_of(JOB, &rig);
         std::fs::write(&path, "two").unwrap();
         assert_ne!(one, hash_of(JOB, &rig));
+    }
+
+    #[test]
+    fn what_the_rig_is_called_and_who_measures_is_no_other_result() {
+        let named = "[rig]\nname = \"North\"\nid = \"R1\"\nlocation = \"room 4\"\n";
+        assert_eq!(hash_of(JOB, ""), hash_of(JOB, named));
+        let said = format!("{JOB}[run]\noperator = \"Meier\"\nproject = \"P-17\"\n");
+        assert_eq!(hash_of(JOB, ""), hash_of(&said, ""));
     }
 
     #[test]

@@ -143,6 +143,8 @@ pub fn same_rig(header: &Header, rig: &RigFile) -> Result<(), SessionError> {
     let mut began = RigFile::parse(&header.rig, Path::new("the run's rig file"))?;
     began.bus = rig.bus.clone();
     began.sim = rig.sim.clone();
+    // What it is called makes it no other rig.
+    began.about = rig.about.clone();
     if began != *rig {
         return Err(SessionError::OtherRig {
             run: header.run.clone(),

@@ -7,9 +7,11 @@ use toml::Spanned;
 use crate::first::first;
 use crate::{Arc, Distribution, FORMATS, Job, Mode, Model, Plane, SweepError};
 
+mod record;
 mod scene;
 mod until;
 
+use record::{RawRun, RawSpecimen};
 use scene::RawScene;
 use until::RawSweep;
 
@@ -26,7 +28,9 @@ const OFFSET: RangeInclusive<f64> = -1.0..=1.0;
 #[serde(deny_unknown_fields)]
 struct RawJob {
     #[serde(default)]
-    specimen: String,
+    specimen: RawSpecimen,
+    #[serde(default)]
+    run: RawRun,
     #[serde(default)]
     on_stage: bool,
     #[serde(default)]
@@ -210,9 +214,12 @@ impl Job {
             planes = first;
             arc = arc.or(Some(along));
         }
+        let (operator, project) = raw.run.check(&source)?;
         Ok(Self {
             name: name.to_owned(),
-            specimen: raw.specimen,
+            specimen: raw.specimen.check(&source)?,
+            operator,
+            project,
             on_stage: raw.on_stage,
             planes,
             arc,

@@ -1,6 +1,8 @@
 use pdv::{Distribution, Scene};
 use serde::{Deserialize, Serialize};
 
+use crate::Specimen;
+
 /// The formats that a job may ask for; a test of `report` compares them with the crate `formats`.
 pub const FORMATS: [&str; 12] = [
     "merl",
@@ -22,8 +24,12 @@ pub const FORMATS: [&str; 12] = [
 pub struct Job {
     /// What messages call the job file.
     pub name: String,
-    /// What lies on the stage, in the technician's words.
-    pub specimen: String,
+    /// What lies on the stage.
+    pub specimen: Specimen,
+    /// Who measures, in their own words; empty where nothing is said.
+    pub operator: String,
+    /// What it is measured for, likewise.
+    pub project: String,
     /// Whether that lies on the stage already, so that nobody need be asked before it is measured.
     pub on_stage: bool,
     /// Plane sweeps, at least one.

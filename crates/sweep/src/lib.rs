@@ -18,6 +18,7 @@ mod plan;
 mod planner;
 mod reach;
 mod route;
+mod specimen;
 mod targets;
 mod unread;
 
@@ -33,3 +34,4 @@ pub use pdv::{Cell, Distribution, Scene};
 pub use plan::{LeftOut, Plan, Step, Sweep};
 pub use planner::{Visit, plan, visits};
 pub use route::way;
+pub use specimen::{RecordFlaw, Specimen, line};

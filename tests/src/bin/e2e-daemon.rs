@@ -69,6 +69,7 @@ async fn obey(daemon: &Daemon, command: &str) -> Result<Value, Refusal> {
             let submission = Submission {
                 job: std::fs::read_to_string(about).expect("the test's own job file"),
                 name: about.to_owned(),
+                whole: true,
             };
             Ok(json!(daemon.submit(&by, submission).await?))
         }

@@ -2,7 +2,8 @@ use std::convert::Infallible;
 use std::sync::Arc;
 use std::time::Duration;
 
-use axum::extract::{Query, State};
+use axum::Json;
+use axum::extract::State;
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::sse::{self, KeepAlive, Sse};
 use futures_util::stream::{self, Stream};
@@ -12,18 +13,22 @@ use tokio::time::{Instant, sleep_until};
 use utoipa::IntoParams;
 use utoipa_axum::{router::OpenApiRouter, routes};
 
+use super::keys::Asked;
 use super::metrics::Open;
 use super::problem::Problem;
 use super::shared::Shared;
-use crate::{Events, RigView};
+use crate::event::TOLD;
+use crate::{Event, Events, RigView};
 
 /// Pictures of the rig are sent at most so often; an eye does not follow more.
 const PICTURE_EVERY: Duration = Duration::from_millis(50);
 /// A quiet stream says so often that it lives, so that either side notices when the other is gone.
 const KEEP_ALIVE: Duration = Duration::from_secs(10);
+/// Events that are told of what happened, unless said otherwise.
+const LOGGED: usize = 60;
 
 pub(crate) fn routes() -> OpenApiRouter<Shared> {
-    OpenApiRouter::new().routes(routes!(events))
+    OpenApiRouter::new().routes(routes!(events)).routes(routes!(log))
 }
 
 /// Where to go on.
@@ -32,6 +37,31 @@ pub(crate) fn routes() -> OpenApiRouter<Shared> {
 struct After {
     /// Events after this id; the header Last-Event-ID outranks it. Without either, events from now on.
     after: Option<u64>,
+}
+
+/// How much to tell.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+struct Most {
+    /// At most so many events, the latest; 60 unless given.
+    #[param(minimum = 1, maximum = 100)]
+    limit: Option<usize>,
+}
+
+/// What happened: the latest events that whoever comes later wants to know of, oldest first.
+///
+/// Those of jobs, poses measured again, warnings, faults and acknowledgements, since the daemon was started.
+#[utoipa::path(get, path = "/log", tag = "events", params(Most), responses((status = 200, body = Vec<Event>)))]
+async fn log(
+    State(shared): State<Shared>,
+    Asked(Most { limit }): Asked<Most>,
+) -> Result<Json<Vec<Event>>, Problem> {
+    let limit = limit.unwrap_or(LOGGED);
+    if !(1..=TOLD).contains(&limit) {
+        let why = format!("limit is {limit}, allowed are 1 … {TOLD}");
+        return Err(Problem::new(StatusCode::BAD_REQUEST, why));
+    }
+    Ok(Json(shared.daemon.latest_events(limit)))
 }
 
 /// What happens, as it happens: server-sent events.
@@ -44,7 +74,7 @@ struct After {
         (status = 503, body = Problem, content_type = "application/problem+json", description = "Too many streams are open")))]
 async fn events(
     State(shared): State<Shared>,
-    Query(After { after }): Query<After>,
+    Asked(After { after }): Asked<After>,
     headers: HeaderMap,
 ) -> Result<Sse<impl Stream<Item = Result<sse::Event, Infallible>>>, Problem> {
     let permit = Arc::clone(&shared.streams).try_acquire_owned().map_err(|_| {

@@ -1,5 +1,7 @@
 use serde::Deserialize;
 use utoipa::ToSchema;
+use utoipa::openapi::schema::{ObjectBuilder, OneOfBuilder, Schema, Type};
+use utoipa::openapi::{Ref, RefOr};
 
 /// A job file in JSON, with the keys that config/jobs/quickstart.toml explains.
 ///
@@ -8,9 +10,12 @@ use utoipa::ToSchema;
 #[serde(deny_unknown_fields)]
 #[expect(dead_code, reason = "describes, never holds")]
 pub(crate) struct JobFile {
-    /// What lies on the stage, in your own words.
+    /// What lies on the stage, in your own words: a name, or a table that says more.
+    #[schema(schema_with = name_or_table)]
+    specimen: Option<SpecimenTable>,
+    /// Who measures, and what for.
     #[serde(default)]
-    specimen: String,
+    run: RunTable,
     /// Whether it lies on the stage already; otherwise someone must say so before the job starts.
     #[serde(default)]
     on_stage: bool,
@@ -32,6 +37,57 @@ pub(crate) struct JobFile {
     /// How the sweeps are run, and when to stop.
     #[serde(default)]
     sweep: SweepTable,
+}
+
+/// What lies on the stage.
+#[derive(Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "describes, never holds")]
+pub(crate) struct SpecimenTable {
+    /// Its name.
+    #[serde(default)]
+    name: String,
+    /// Its number in whatever list it stands.
+    #[schema(max_length = 200)]
+    #[serde(default)]
+    id: String,
+    /// What it is made of.
+    #[schema(max_length = 200)]
+    #[serde(default)]
+    material: String,
+    /// Words under which it is to be found again, each of 1 … 50 characters.
+    #[schema(max_items = 20)]
+    #[serde(default)]
+    tags: Vec<String>,
+    /// Anything else.
+    #[schema(max_length = 10_000)]
+    #[serde(default)]
+    notes: String,
+}
+
+/// A specimen is a name or a table.
+fn name_or_table() -> RefOr<Schema> {
+    let about = "What lies on the stage, in your own words: a name, or a table that says more.";
+    let either = OneOfBuilder::new()
+        .item(ObjectBuilder::new().schema_type(Type::String))
+        .item(Ref::from_schema_name("SpecimenTable"))
+        .description(Some(about));
+    either.into()
+}
+
+/// Who measures, and what for.
+#[derive(Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "describes, never holds")]
+struct RunTable {
+    /// Who measures.
+    #[schema(max_length = 200)]
+    #[serde(default)]
+    operator: String,
+    /// What it is measured for.
+    #[schema(max_length = 200)]
+    #[serde(default)]
+    project: String,
 }
 
 /// One plane sweep.

@@ -1,5 +1,5 @@
 use axum::body::Bytes;
-use axum::extract::{Path, Query, State};
+use axum::extract::{Path, State};
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{AppendHeaders, IntoResponse, Response};
 use axum::{Extension, Json};
@@ -9,8 +9,10 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::body;
 use super::job_file::JobFile;
+use super::keys::{Asked, with_next};
 use super::problem::Problem;
 use super::shared::{Shared, long_json};
+use crate::history::USUAL;
 use crate::{Action, Caller, Job, JobId, PlanView, Submission};
 
 pub(crate) fn routes() -> OpenApiRouter<Shared> {
@@ -21,24 +23,53 @@ pub(crate) fn routes() -> OpenApiRouter<Shared> {
         .routes(routes!(plan))
 }
 
-/// What to call a job.
+/// What to call a job, and what its run leaves.
 #[derive(Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
 struct Naming {
     /// What messages call the job's file.
     #[param(max_length = 200)]
     name: Option<String>,
+    /// Whether the run directory gets all files, also the large ones that can be made when somebody asks for them.
+    #[serde(default)]
+    whole: bool,
+}
+
+/// Which jobs.
+#[derive(Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+struct Page {
+    /// At most so many that are over; 50 unless given.
+    #[param(minimum = 1, maximum = 200)]
+    limit: Option<u32>,
+    /// Only those that are over and whose place is before this one.
+    before: Option<u64>,
 }
 
 /// The jobs in the order in which they are worked off, by `place`: the latest that are over, then the queue.
-#[utoipa::path(get, path = "/jobs", tag = "queue", responses((status = 200, body = Vec<Job>)))]
-async fn jobs(State(shared): State<Shared>) -> Result<Response, Problem> {
+///
+/// Where there are earlier ones that are over, the header Link says where (RFC 8288, `rel="next"`).
+#[utoipa::path(get, path = "/jobs", tag = "queue", params(Page), responses((status = 200, body = Vec<Job>,
+    headers(("Link" = String, description = "Where the jobs before these are found, if there are any")))))]
+async fn jobs(
+    State(shared): State<Shared>,
+    Asked(Page { limit, before }): Asked<Page>,
+) -> Result<Response, Problem> {
     let daemon = shared.daemon.clone();
+    let limit = limit.unwrap_or(USUAL);
     shared
         .work(async move {
-            let mut jobs = daemon.jobs().await?;
+            let mut jobs = daemon.jobs_over(before, limit).await?;
+            let earlier = (jobs.len() == limit as usize).then(|| jobs.last().map(|job| job.place));
+            if before.is_none() {
+                jobs.extend(daemon.waiting_jobs().await?);
+            }
             jobs.sort_by_key(|job| job.place);
-            long_json(jobs).await
+            let answer = long_json(jobs).await?;
+            let next = earlier
+                .flatten()
+                .map(|place| vec![("limit", limit.to_string()), ("before", place.to_string())]);
+            Ok(with_next(answer, next))
         })
         .await
 }
@@ -53,7 +84,7 @@ async fn jobs(State(shared): State<Shared>) -> Result<Response, Problem> {
 async fn submit(
     State(shared): State<Shared>,
     Extension(by): Extension<Caller>,
-    Query(Naming { name }): Query<Naming>,
+    Asked(Naming { name, whole }): Asked<Naming>,
     headers: HeaderMap,
     text: Bytes,
 ) -> Result<impl IntoResponse, Problem> {
@@ -67,7 +98,7 @@ async fn submit(
     let job = job_text(&headers, &text)?;
     let daemon = shared.daemon.clone();
     let job = shared
-        .work(async move { Ok(daemon.submit(&by, Submission { job, name }).await?) })
+        .work(async move { Ok(daemon.submit(&by, Submission { job, name, whole }).await?) })
         .await?;
     let location = format!("/api/v1/jobs/{}", job.id);
     Ok((

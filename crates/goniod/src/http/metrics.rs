@@ -245,6 +245,7 @@ pub(crate) async fn count(State(shared): State<Shared>, request: Request, next: 
         "POST" => "POST",
         "HEAD" => "HEAD",
         "DELETE" => "DELETE",
+        "PATCH" => "PATCH",
         _ => "other",
     };
     let response = next.run(request).await;

@@ -6,6 +6,7 @@ use utoipa::openapi::security::{
 use utoipa::openapi::{Content, Ref, RefOr, ResponseBuilder};
 use utoipa_axum::router::OpenApiRouter;
 
+use super::job_file::SpecimenTable;
 use super::problem::{MEDIA_TYPE, Problem};
 use super::shared::Shared;
 use super::{credential, events, exports, jobs, rig, runs, session};
@@ -36,7 +37,7 @@ const REFUSALS: [(&str, &str); 8] = [
         description = "A gonio-reflectometer with two arms: its queue, its runs, and the hands that stop it. \
             Errors are RFC 9457 problem documents."
     ),
-    components(schemas(Problem, Event, Action)),
+    components(schemas(Problem, Event, Action, SpecimenTable)),
     tags(
         (name = "rig", description = "The arms, and the hands that stop them"),
         (name = "queue", description = "Jobs, in the order in which they are worked off"),
@@ -86,7 +87,7 @@ fn complete(document: &mut utoipa::openapi::OpenApi) {
         SecurityRequirement::new::<_, [&str; 0], &str>("cookie", []),
     ]);
     for item in document.paths.paths.values_mut() {
-        let operations = [&mut item.get, &mut item.post, &mut item.delete];
+        let operations = [&mut item.get, &mut item.post, &mut item.patch, &mut item.delete];
         for operation in operations.into_iter().flatten() {
             refusals(operation);
         }

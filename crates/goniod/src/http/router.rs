@@ -10,14 +10,19 @@ use tower_http::limit::RequestBodyLimitLayer;
 use tower_http::set_header::SetResponseHeaderLayer;
 use tower_http::timeout::TimeoutLayer;
 
+use super::keys::QueryKeys;
 use super::openapi::{API, api};
 use super::problem::{Problem, only_problems};
 use super::shared::Shared;
-use super::{Limits, access, metrics, page};
+use super::{Limits, access, keys, metrics, page};
 
 /// Everything that is answered, behind all that a request must pass first.
 pub(crate) fn router(shared: Shared, limits: &Limits) -> Router {
     let (api, document) = api();
+    let api = api.route_layer(middleware::from_fn_with_state(
+        QueryKeys::of(&document),
+        keys::only_known,
+    ));
     let nowhere = async || Problem::new(StatusCode::NOT_FOUND, "there is nothing at this address");
     api.route(&format!("{API}/openapi.json"), get(async move || Json(document)))
         .route("/health", get(health))

@@ -129,6 +129,7 @@ mod tests {
         OperatorRecord {
             queue_held: true,
             faults: vec![FaultView {
+                remedy: None,
                 id: FaultId::generate(),
                 code: FaultCode::Estop,
                 text: "emergency stop by a test".to_owned(),

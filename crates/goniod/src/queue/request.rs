@@ -15,6 +15,8 @@ const WAITING: usize = 1000;
 pub(crate) enum Request {
     Submit {
         order: Box<RunRequest>,
+        /// Whether the run directory gets all files.
+        whole: bool,
         receipt: Receipt,
         reply: Reply<Job>,
     },
@@ -37,10 +39,11 @@ impl Queue {
         match request {
             Request::Submit {
                 order,
+                whole,
                 receipt,
                 reply,
             } => {
-                let result = self.submit(&order, receipt, &reply.by.name).await;
+                let result = self.submit(&order, whole, receipt, &reply.by.name).await;
                 reply.send(&self.shared, &format!("submit {}", order.job.name), result);
             }
             Request::Act {
@@ -56,7 +59,13 @@ impl Queue {
         }
     }
 
-    async fn submit(&mut self, order: &RunRequest, receipt: Receipt, by: &str) -> Result<Job, Refusal> {
+    async fn submit(
+        &mut self,
+        order: &RunRequest,
+        whole: bool,
+        receipt: Receipt,
+        by: &str,
+    ) -> Result<Job, Refusal> {
         if self.jobs.len() >= WAITING {
             return Err(Refusal::new(
                 RefusalKind::Busy,
@@ -68,13 +77,14 @@ impl Queue {
             id: JobId::generate(),
             place: 0,
             name: order.job.name.clone(),
-            specimen: order.job.specimen.clone(),
+            specimen: order.job.specimen.name.clone(),
             on_stage: order.job.on_stage,
             text: order.job_text.clone(),
             state: JobState::Queued,
             why: None,
             run: None,
             verdict: None,
+            whole,
             by: by.to_owned(),
             submitted: now.clone(),
             changed: now,

@@ -6,7 +6,7 @@ use capture::Record;
 use tokio::sync::watch;
 
 use super::{Store, StoreError};
-use crate::{FaultView, Job, JobId, RunView, VerdictView};
+use crate::{FaultView, Job, JobId, RunQuery, RunView, VerdictView};
 
 /// A store that is gone with the program. It can be paused, slowed down, and made to fail, at every call.
 ///
@@ -95,6 +95,9 @@ impl Kept {
         let records = self.records.get(id).map_or(&[][..], Vec::as_slice);
         let accepted = |record: &&Record| matches!(record, Record::Reading(reading) if reading.accepted);
         run.accepted = records.iter().filter(accepted).count() as u64;
+        if let Some(job) = self.jobs.values().find(|job| job.id == run.job) {
+            run.state = job.state;
+        }
         Some(run)
     }
 
@@ -142,20 +145,29 @@ impl Store for Memory {
         .await
     }
 
-    async fn jobs(&self, over: u32) -> Result<Vec<Job>, StoreError> {
+    async fn waiting_jobs(&self) -> Result<Vec<Job>, StoreError> {
         self.call("list the queue", |kept| {
             let waiting = kept.jobs.values().filter(|job| !job.state.over());
-            let ended = kept.jobs.values().rev().filter(|job| job.state.over());
-            Ok(waiting.chain(ended.take(over as usize)).cloned().collect())
+            Ok(waiting.cloned().collect())
         })
         .await
     }
 
-    async fn begin_run(&self, run: &RunView, header: &Record) -> Result<(), StoreError> {
+    async fn jobs_over(&self, before: Option<u64>, most: u32) -> Result<Vec<Job>, StoreError> {
+        self.call("list jobs that are over", |kept| {
+            let over = kept.jobs.values().rev().filter(|job| job.state.over());
+            let over = over.filter(|job| before.is_none_or(|before| job.place < before));
+            Ok(over.take(most as usize).cloned().collect())
+        })
+        .await
+    }
+
+    async fn begin_run(&self, run: &mut RunView, header: &Record) -> Result<(), StoreError> {
         self.call("begin a run", |kept| {
             if kept.records.contains_key(&run.id) {
                 return Err(Kept::taken("run"));
             }
+            run.place = kept.runs.last().map_or(1, |last| last.place + 1);
             kept.runs.push(run.clone());
             kept.records.insert(run.id.clone(), vec![header.clone()]);
             if let Some(job) = kept.jobs.values_mut().find(|job| job.id == run.job) {
@@ -181,10 +193,50 @@ impl Store for Memory {
         .await
     }
 
-    async fn runs(&self, most: u32) -> Result<Vec<RunView>, StoreError> {
+    async fn describe_run(&self, run: &RunView) -> Result<(), StoreError> {
+        self.call("describe a run", |kept| {
+            if let Some(known) = kept.runs.iter_mut().find(|known| known.id == run.id) {
+                known.specimen.clone_from(&run.specimen);
+                known.record = run.record.clone();
+            }
+            Ok(())
+        })
+        .await
+    }
+
+    async fn archive_run(&self, run: &str, at: Option<&str>) -> Result<(), StoreError> {
+        self.call("put a run away", |kept| {
+            if let Some(known) = kept.runs.iter_mut().find(|known| known.id == run) {
+                known.archived = at.map(str::to_owned);
+            }
+            Ok(())
+        })
+        .await
+    }
+
+    async fn delete_run(&self, run: &str) -> Result<(), StoreError> {
+        self.call("delete a run", |kept| {
+            kept.runs.retain(|known| known.id != run);
+            kept.records.remove(run);
+            for job in kept
+                .jobs
+                .values_mut()
+                .filter(|job| job.run.as_deref() == Some(run))
+            {
+                (job.run, job.verdict) = (None, None);
+            }
+            Ok(())
+        })
+        .await
+    }
+
+    async fn runs(&self, query: &RunQuery) -> Result<Vec<RunView>, StoreError> {
         self.call("list the runs", |kept| {
-            let latest = kept.runs.iter().rev().take(most as usize);
-            Ok(latest.filter_map(|run| kept.run(&run.id)).collect())
+            let latest = kept.runs.iter().rev();
+            let before = latest.filter(|run| query.before.is_none_or(|before| run.place < before));
+            let runs = before.filter_map(|run| kept.run(&run.id));
+            let wanted = runs.filter(|run| query.matches(run));
+            Ok(wanted.take(query.limit as usize).collect())
         })
         .await
     }

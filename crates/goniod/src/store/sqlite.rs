@@ -11,9 +11,12 @@ use sqlx::sqlite::{
 };
 
 use super::{Store, StoreError};
-use crate::{FaultId, FaultView, Job, JobId, RunView, VerdictView};
+use crate::{FaultId, FaultView, Job, JobId, RunQuery, RunView, VerdictView};
 
 mod copy;
+mod history;
+#[cfg(test)]
+mod history_tests;
 mod row;
 mod soundness;
 #[cfg(test)]
@@ -25,9 +28,8 @@ use row::{column, failed, job, json, kind, number, of_word, run, word};
 
 /// How long a statement waits for another program that holds the database.
 const BUSY: Duration = Duration::from_secs(2);
-/// Columns of a run, with what its journal says of it.
-const RUN: &str = "SELECT runs.*, jobs.name, jobs.specimen, (SELECT COUNT(*) FROM records WHERE records.run = runs.id \
-                   AND records.accepted = 1) AS accepted FROM runs JOIN jobs ON jobs.id = runs.job";
+/// Columns of a run, with what its job's file is called.
+const RUN: &str = "SELECT runs.*, jobs.name FROM ";
 
 /// Columns of a job, with what its run came to.
 const JOB: &str =
@@ -93,6 +95,7 @@ fn migrations() -> Migrator {
     let steps = [
         ("queue", include_str!("0001_queue.sql")),
         ("verdict", include_str!("0002_verdict.sql")),
+        ("history", include_str!("0003_history.sql")),
     ];
     let migration = |(version, (description, sql)): (i64, (&'static str, &'static str))| {
         let description = Cow::Borrowed(description);
@@ -128,8 +131,8 @@ impl Store for Sqlite {
     async fn add_job(&self, job: &mut Job) -> Result<(), StoreError> {
         let row = sqlx::query(
             "INSERT INTO jobs (id, place, name, specimen, on_stage, body, state, why, run, submitted_by, submitted, \
-             changed) VALUES ($1, (SELECT COALESCE(MAX(place), 0) + 1 FROM jobs), $2, $3, $4, $5, $6, $7, $8, $9, \
-             $10, $11) RETURNING place",
+             changed, whole) VALUES ($1, (SELECT COALESCE(MAX(place), 0) + 1 FROM jobs), $2, $3, $4, $5, $6, $7, $8, \
+             $9, $10, $11, $12) RETURNING place",
         )
         .bind(job.id.to_string())
         .bind(&job.name)
@@ -142,6 +145,7 @@ impl Store for Sqlite {
         .bind(&job.by)
         .bind(&job.submitted)
         .bind(&job.changed)
+        .bind(i64::from(job.whole))
         .fetch_one(&self.writer)
         .await
         .map_err(failed("queue a job"))?;
@@ -150,16 +154,24 @@ impl Store for Sqlite {
     }
 
     async fn change_job(&self, job: &Job) -> Result<(), StoreError> {
+        let failed = || failed("change a job");
+        let mut transaction = self.writer.begin().await.map_err(failed())?;
         sqlx::query("UPDATE jobs SET state = $2, why = $3, run = $4, changed = $5 WHERE id = $1")
             .bind(job.id.to_string())
             .bind(word(&job.state))
             .bind(&job.why)
             .bind(&job.run)
             .bind(&job.changed)
-            .execute(&self.writer)
+            .execute(&mut *transaction)
             .await
-            .map_err(failed("change a job"))?;
-        Ok(())
+            .map_err(failed())?;
+        sqlx::query("UPDATE runs SET state = $2 WHERE job = $1")
+            .bind(job.id.to_string())
+            .bind(word(&job.state))
+            .execute(&mut *transaction)
+            .await
+            .map_err(failed())?;
+        transaction.commit().await.map_err(failed())
     }
 
     async fn job(&self, id: JobId) -> Result<Option<Job>, StoreError> {
@@ -171,33 +183,45 @@ impl Store for Sqlite {
         row.as_ref().map(job).transpose()
     }
 
-    async fn jobs(&self, over: u32) -> Result<Vec<Job>, StoreError> {
+    async fn waiting_jobs(&self) -> Result<Vec<Job>, StoreError> {
         const WAITING: &str = "state NOT IN ('done', 'failed', 'cancelled') ORDER BY place";
-        const OVER: &str = "state IN ('done', 'failed', 'cancelled') ORDER BY place DESC LIMIT $1";
         let waiting = sqlx::query(sqlx::AssertSqlSafe(format!("{JOB}{WAITING}")))
             .fetch_all(&self.reader)
             .await
             .map_err(failed("list the queue"))?;
+        waiting.iter().map(job).collect()
+    }
+
+    async fn jobs_over(&self, before: Option<u64>, most: u32) -> Result<Vec<Job>, StoreError> {
+        const OVER: &str =
+            "state IN ('done', 'failed', 'cancelled') AND place < $1 ORDER BY place DESC LIMIT $2";
         let over = sqlx::query(sqlx::AssertSqlSafe(format!("{JOB}{OVER}")))
-            .bind(i64::from(over))
+            .bind(history::bound(before))
+            .bind(i64::from(most))
             .fetch_all(&self.reader)
             .await
             .map_err(failed("list jobs that are over"))?;
-        waiting.iter().chain(&over).map(job).collect()
+        over.iter().map(job).collect()
     }
 
-    async fn begin_run(&self, run: &RunView, header: &Record) -> Result<(), StoreError> {
+    async fn begin_run(&self, run: &mut RunView, header: &Record) -> Result<(), StoreError> {
         let failed = || failed("begin a run");
         let mut transaction = self.writer.begin().await.map_err(failed())?;
-        sqlx::query("INSERT INTO runs (id, job, directory, planned, started) VALUES ($1, $2, $3, $4, $5)")
-            .bind(&run.id)
-            .bind(run.job.to_string())
-            .bind(run.directory.to_string_lossy().into_owned())
-            .bind(run.planned as i64)
-            .bind(&run.started)
-            .execute(&mut *transaction)
-            .await
-            .map_err(failed())?;
+        let row = sqlx::query(
+            "INSERT INTO runs (id, job, directory, planned, started, state, place) VALUES ($1, $2, $3, $4, $5, $6, \
+             (SELECT COALESCE(MAX(place), 0) + 1 FROM runs)) RETURNING place",
+        )
+        .bind(&run.id)
+        .bind(run.job.to_string())
+        .bind(run.directory.to_string_lossy().into_owned())
+        .bind(run.planned as i64)
+        .bind(&run.started)
+        .bind(word(&run.state))
+        .fetch_one(&mut *transaction)
+        .await
+        .map_err(failed())?;
+        run.place = number(&row, "place")?;
+        history::describe(&mut transaction, run).await.map_err(failed())?;
         sqlx::query("INSERT INTO records (run, seq, kind, body) VALUES ($1, 0, $2, $3)")
             .bind(&run.id)
             .bind(kind(header))
@@ -225,11 +249,33 @@ impl Store for Sqlite {
         Ok(())
     }
 
-    async fn runs(&self, most: u32) -> Result<Vec<RunView>, StoreError> {
-        const LATEST: &str = " ORDER BY jobs.place DESC LIMIT $1";
-        let query = sqlx::AssertSqlSafe(format!("{RUN}{LATEST}"));
-        let rows = sqlx::query(query)
-            .bind(i64::from(most))
+    async fn describe_run(&self, run: &RunView) -> Result<(), StoreError> {
+        let failed = || failed("describe a run");
+        let mut transaction = self.writer.begin().await.map_err(failed())?;
+        history::describe(&mut transaction, run).await.map_err(failed())?;
+        transaction.commit().await.map_err(failed())
+    }
+
+    async fn archive_run(&self, run: &str, at: Option<&str>) -> Result<(), StoreError> {
+        sqlx::query("UPDATE runs SET archived = $2 WHERE id = $1")
+            .bind(run)
+            .bind(at)
+            .execute(&self.writer)
+            .await
+            .map_err(failed("put a run away"))?;
+        Ok(())
+    }
+
+    async fn delete_run(&self, run: &str) -> Result<(), StoreError> {
+        let failed = || failed("delete a run");
+        let mut transaction = self.writer.begin().await.map_err(failed())?;
+        history::delete(&mut transaction, run).await.map_err(failed())?;
+        transaction.commit().await.map_err(failed())
+    }
+
+    async fn runs(&self, query: &RunQuery) -> Result<Vec<RunView>, StoreError> {
+        let rows = history::select(query)
+            .build()
             .fetch_all(&self.reader)
             .await
             .map_err(failed("list the runs"))?;
@@ -237,7 +283,9 @@ impl Store for Sqlite {
     }
 
     async fn run(&self, id: &str) -> Result<Option<RunView>, StoreError> {
-        let query = sqlx::AssertSqlSafe(format!("{RUN} WHERE runs.id = $1"));
+        let query = sqlx::AssertSqlSafe(format!(
+            "{RUN}runs JOIN jobs ON jobs.id = runs.job WHERE runs.id = $1"
+        ));
         let row = sqlx::query(query)
             .bind(id)
             .fetch_optional(&self.reader)
@@ -253,9 +301,15 @@ impl Store for Sqlite {
         };
         let recorded = || failed("record a reading");
         let mut transaction = self.writer.begin().await.map_err(recorded())?;
-        if let Record::Extension(extension) = record {
-            sqlx::query("UPDATE runs SET planned = planned + $1 WHERE id = $2")
-                .bind(extension.steps.len() as i64)
+        let planned = match record {
+            Record::Extension(extension) => extension.steps.len(),
+            _ => 0,
+        };
+        let accepted = reading.is_some_and(|reading| reading.accepted);
+        if planned > 0 || accepted {
+            sqlx::query("UPDATE runs SET planned = planned + $1, accepted = accepted + $2 WHERE id = $3")
+                .bind(planned as i64)
+                .bind(i64::from(accepted))
                 .bind(run)
                 .execute(&mut *transaction)
                 .await
@@ -300,6 +354,7 @@ impl Store for Sqlite {
             .map_err(failed("look up faults"))?;
         let fault = |row: &SqliteRow| {
             Ok(FaultView {
+                remedy: None,
                 id: FaultId::generate(),
                 code: of_word(&column::<String>(row, "code")?, "fault")?,
                 text: column(row, "what")?,

@@ -1,6 +1,6 @@
 use arms::Pose;
 use capture::{Command, Journal, Outcome, Record};
-use report::RunDirectory;
+use report::{RunDirectory, Volume};
 
 use super::observer::Observer;
 use super::{RigWorker, gone, stopped};
@@ -8,7 +8,7 @@ use crate::operator::Permit;
 use crate::queue::{Ending, WorkerEvent};
 use crate::refusal::chain;
 use crate::store::StoreJournal;
-use crate::{Activity, DaemonError, FaultCode, Job, RigSource, RunView, view};
+use crate::{Activity, DaemonError, FaultCode, Job, RecordView, RigSource, RunView, view};
 use session::{RunRequest, SessionError, is_disk_full};
 
 /// How a capture ended, and the fault that ended it.
@@ -67,7 +67,12 @@ impl<S: RigSource> RigWorker<S> {
         };
         permit.release();
         self.shared.activity(Activity::Reporting);
-        self.write_report(&run, journal.records().to_vec()).await?;
+        let volume = match job.whole {
+            true => Volume::Whole,
+            false => Volume::WithoutLarge,
+        };
+        self.write_report(&run, journal.records().to_vec(), volume)
+            .await?;
         Ok(captured)
     }
 
@@ -81,6 +86,7 @@ impl<S: RigSource> RigWorker<S> {
             settings.rig.clone(),
             settings.rig_name.as_ref(),
         )?;
+        let record = record(&order.job, &job.by);
         self.shared.activity(Activity::Identifying);
         let mut command = permit.command();
         let start = tokio::select! {
@@ -95,9 +101,13 @@ impl<S: RigSource> RigWorker<S> {
             order.header(plan, &id, now)
         });
         let header = self.attend(planned).await.map_err(DaemonError::Planning)??;
-        let run = RunView {
+        let mut run = RunView {
             id: id.to_string(),
+            place: 0,
             job: job.id,
+            state: job.state,
+            record,
+            archived: None,
             name: job.name.clone(),
             specimen: job.specimen.clone(),
             directory: self.shared.runs().join(session::run_directory_name(now, &id)),
@@ -111,7 +121,7 @@ impl<S: RigSource> RigWorker<S> {
             return Ok(None);
         }
         let header = Record::Header(header);
-        self.attend(shared.store.begin_run(&run, &header)).await?;
+        self.attend(shared.store.begin_run(&mut run, &header)).await?;
         self.report(WorkerEvent::Begun { run: run.id.clone() }).await;
         Ok(Some(run.id))
     }
@@ -141,13 +151,18 @@ impl<S: RigSource> RigWorker<S> {
     }
 
     /// Writes the run directory. An emergency stop is carried out meanwhile.
-    async fn write_report(&mut self, run: &str, records: Vec<Record>) -> Result<(), DaemonError> {
+    async fn write_report(
+        &mut self,
+        run: &str,
+        records: Vec<Record>,
+        volume: Volume,
+    ) -> Result<(), DaemonError> {
         let shared = self.shared.clone();
         let Some(view) = self.attend(shared.store.run(run)).await? else {
             return Ok(());
         };
         let directory = RunDirectory::at(&view.directory);
-        let writing = tokio::task::spawn_blocking(move || crate::daemon::write(&directory, &records));
+        let writing = tokio::task::spawn_blocking(move || crate::daemon::write(&directory, &records, volume));
         // A report that panics costs no measurement and not the thread of the rig.
         let report = self
             .attend(writing)
@@ -161,6 +176,23 @@ impl<S: RigSource> RigWorker<S> {
         self.attend(shared.store.reported(run, &now, verdict)).await?;
         self.report(WorkerEvent::Reported { verdict }).await;
         Ok(())
+    }
+}
+
+/// What a job says of its run for the record; who submitted it has measured where it does not say.
+fn record(job: &sweep::Job, by: &str) -> RecordView {
+    let specimen = &job.specimen;
+    RecordView {
+        specimen_id: specimen.id.clone(),
+        material: specimen.material.clone(),
+        tags: specimen.tags.clone(),
+        notes: specimen.notes.clone(),
+        operator: match job.operator.as_str() {
+            "" => by.to_owned(),
+            operator => operator.to_owned(),
+        },
+        project: job.project.clone(),
+        ..RecordView::default()
     }
 }
 

@@ -40,8 +40,10 @@ async fn the_served_document_is_the_committed_one() {
 #[test]
 fn the_document_knows_every_key_and_word_of_a_job_file() {
     /// A table of the document, and a job file with something unknown in that table.
-    const UNKNOWN: [(&str, &str); 6] = [
+    const UNKNOWN: [(&str, &str); 8] = [
         ("JobFile", "unknown = 1"),
+        ("SpecimenTable", "[specimen]\nunknown = 1"),
+        ("RunTable", "[run]\nunknown = 1"),
         ("PlaneTable", "[[plane]]\nunknown = 1"),
         ("ArcTable", "[arc]\nunknown = 1"),
         ("ReconstructionTable", "[reconstruction]\nunknown = 1"),
@@ -152,5 +154,62 @@ async fn the_page_may_use_this_daemon_alone() {
         assert_eq!(service.ask("GET", reference, &known, "").await.status, 304);
     }
     assert!(!text.contains("http"), "nothing comes from elsewhere");
+    service.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_query_key_that_an_operation_does_not_take_is_refused_everywhere() {
+    let service = Service::start().await;
+    let document = serde_json::to_value(goniod::http::openapi()).unwrap();
+    let mut tried = 0;
+    for (path, item) in document["paths"].as_object().unwrap() {
+        let address = path.replace("{id}", "01KAGN4Z7Q3X9V5T8R2M6C1D0B");
+        let address = address.replace("{action}", "ready").replace("{name}", "run.json");
+        for method in item.as_object().unwrap().keys() {
+            let method = method.to_uppercase();
+            let answer = service.ask(&method, &format!("{address}?limitt=5"), "", "").await;
+            let detail = answer.problem(400);
+            assert!(detail.contains("\"limitt\""), "{method} {address}: {detail}");
+            tried += 1;
+        }
+    }
+    assert!(tried > 20, "{tried}");
+    let detail = service.get("/api/v1/log?limitt=5").await.problem(400);
+    assert!(detail.contains("takes limit"), "{detail}");
+    for wrong in [
+        "/api/v1/log?limit=0",
+        "/api/v1/log?limit=101",
+        "/api/v1/log?limit=many",
+        "/api/v1/events?after=-1",
+    ] {
+        let detail = service.get(wrong).await.problem(400);
+        assert!(
+            detail.contains("limit") || detail.contains("after"),
+            "{wrong}: {detail}"
+        );
+    }
+    service.end().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn whoever_comes_later_is_told_what_happened_and_what_to_do() {
+    let service = Service::start().await;
+    let mut watch = service.watch("").await;
+    let id = service.submit().await;
+    assert_eq!(service.post("/api/v1/estop").await.status, 204);
+    watch.until(|event| event["event"] == "fault").await;
+    let log = service.get("/api/v1/log").await.json();
+    let log = log.as_array().unwrap();
+    assert!(
+        log.iter().any(|event| event["job"]["id"] == id.as_str()),
+        "{log:?}"
+    );
+    let fault = &log.iter().find(|event| event["event"] == "fault").unwrap()["fault"];
+    let remedy = fault["remedy"].as_str().unwrap();
+    assert!(remedy.starts_with("Find out why"), "{remedy}");
+    assert_eq!(service.get("/api/v1/rig").await.json()["fault"]["remedy"], remedy);
+    assert!(log.is_sorted_by_key(|event| event["id"].as_u64().unwrap()));
+    let one = service.get("/api/v1/log?limit=1").await.json();
+    assert_eq!(one.as_array().unwrap().len(), 1);
     service.end().await;
 }

@@ -6,6 +6,7 @@
 mod access;
 mod documents;
 mod exports;
+mod history;
 mod limits;
 mod manual;
 mod relay;

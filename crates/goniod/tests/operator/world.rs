@@ -240,6 +240,7 @@ async fn ask(
             let submission = Submission {
                 job: JOB.to_owned(),
                 name: "job.toml".to_owned(),
+                whole: false,
             };
             daemon.submit(&by, submission).await.map(drop)
         }

@@ -24,6 +24,7 @@ pub(crate) fn submission(job: &str) -> Submission {
     Submission {
         job: job.to_owned(),
         name: "job.toml".to_owned(),
+        whole: false,
     }
 }
 

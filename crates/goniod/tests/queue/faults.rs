@@ -137,7 +137,8 @@ async fn a_run_directory_that_cannot_be_written_is_made_from_the_store_later() {
     finish(&daemon, &mut events, &job).await;
     let run = daemon.job(job.id).await.unwrap().run.unwrap();
     let directory = daemon.run(&run).await.unwrap().directory;
-    let brdf = std::fs::read(directory.join("brdf.binary")).unwrap();
+    let made = daemon.make_file(&run, "brdf.binary").await.unwrap().unwrap();
+    let brdf = std::fs::read(made).unwrap();
     std::fs::remove_dir_all(&runs).unwrap();
     daemon.rebuild(&run).await.unwrap();
     assert!(brdf == std::fs::read(directory.join("brdf.binary")).unwrap());

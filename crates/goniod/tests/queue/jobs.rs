@@ -1,5 +1,5 @@
 use capture::{FileJournal, Record};
-use goniod::{Action, JobState, RefusalKind, VerdictView, What};
+use goniod::{Action, JobState, RefusalKind, RunQuery, VerdictView, What};
 use rig::RigFile;
 
 use crate::bench::{Bench, SHORT, idle, on_stage, operator, readings, rig, state, submission, until};
@@ -26,7 +26,7 @@ async fn a_job_waits_for_its_specimen_and_leaves_a_whole_run() {
         "journal",
         "run.json",
         "readings.csv",
-        "brdf.binary",
+        "brdf.uncertainty.json",
         "report.html",
     ] {
         assert!(run.directory.join(file).exists(), "{file}");
@@ -58,7 +58,7 @@ async fn that_a_specimen_is_on_the_stage_holds_for_the_stage_as_it_was() {
     let second = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
     state(&mut events, first.id, JobState::Done).await;
     state(&mut events, second.id, JobState::AwaitingSpecimen).await;
-    assert_eq!(daemon.runs().await.unwrap().len(), 1);
+    assert_eq!(daemon.runs(&RunQuery::latest(9)).await.unwrap().len(), 1);
     daemon.act(&operator(), second.id, Action::Ready).await.unwrap();
     state(&mut events, second.id, JobState::Done).await;
     // Said of an empty queue it holds at once.
@@ -76,7 +76,7 @@ async fn a_job_whose_result_is_none_is_done_and_bad() {
     let job = daemon.submit(&operator(), submission(&on_stage())).await.unwrap();
     let done = state(&mut events, job.id, JobState::Done).await;
     assert_eq!(done.verdict, Some(VerdictView::Bad), "who watches is told");
-    let run = &daemon.runs().await.unwrap()[0];
+    let run = &daemon.runs(&RunQuery::latest(9)).await.unwrap()[0];
     assert_eq!(run.verdict, Some(VerdictView::Bad));
     let kept = daemon.jobs().await.unwrap();
     assert_eq!(kept[0].verdict, Some(VerdictView::Bad), "and who asks later");

@@ -4,16 +4,20 @@ use std::time::Duration;
 use arms::{Arm, ArmAngle, Envelope, Limits, Pose, Profile};
 use toml::Spanned;
 
-use super::raw::{RawArm, RawBus, RawMotion, RawPhotometer};
+use super::raw::{RawAbout, RawArm, RawBus, RawMotion, RawPhotometer};
 use super::source::Source;
 use super::{
-    Approach, ArmSettings, BusSettings, Estop, MotionSettings, PhotometerSettings, Port, RigFile, Visits,
+    About, Approach, ArmSettings, BusSettings, Estop, MotionSettings, PhotometerSettings, Port, RigFile,
+    Visits,
 };
 use crate::dynamixel::{BAUD_RATES, MODELS, Model};
 use crate::{Axis, Calibration, Lamp, RigError};
 
 mod calibration;
 mod suspend;
+
+/// Characters of what a rig is called.
+const ABOUT: usize = 200;
 
 /// The text checked: each key for itself, then what keys say together.
 pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
@@ -47,6 +51,7 @@ pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
         }
     }
     Ok(RigFile {
+        about: about(source, &raw.rig)?,
         bus,
         suspend: suspend::suspend(source, &raw.suspend, [light.model, sensor.model])?,
         arms: [light, sensor],
@@ -59,6 +64,27 @@ pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
         fingerprint: source.fingerprint(RigFile::BUILT_IN)?,
         envelope,
         sim: raw.sim,
+    })
+}
+
+/// What the rig is called.
+fn about(source: &Source<'_>, raw: &RawAbout) -> Result<About, RigError> {
+    let line = |key: &str, value: &Spanned<String>| {
+        let text = value.get_ref().trim();
+        match text.chars().count() <= ABOUT && !text.chars().any(char::is_control) {
+            true => Ok(text.to_owned()),
+            false => Err(source.refuse(
+                key,
+                value,
+                format!("{text:?}"),
+                "a line of at most 200 characters",
+            )),
+        }
+    };
+    Ok(About {
+        name: line("rig.name", &raw.name)?,
+        id: line("rig.id", &raw.id)?,
+        location: line("rig.location", &raw.location)?,
     })
 }
 

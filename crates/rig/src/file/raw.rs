@@ -5,6 +5,7 @@ use toml::Spanned;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct RawFile {
+    pub(super) rig: RawAbout,
     pub(super) bus: RawBus,
     pub(super) light: RawArm,
     pub(super) sensor: RawArm,
@@ -15,6 +16,14 @@ pub(super) struct RawFile {
     pub(super) suspend: RawSuspend,
     pub(super) uncertainty: RawUncertainty,
     pub(super) sim: toml::Table,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawAbout {
+    pub(super) name: Spanned<String>,
+    pub(super) id: Spanned<String>,
+    pub(super) location: Spanned<String>,
 }
 
 #[derive(Deserialize)]

@@ -57,7 +57,9 @@ prop_compose! {
     ) -> Job {
         Job {
             name: "job.toml".to_owned(),
-            specimen: String::new(),
+            specimen: sweep::Specimen::default(),
+            operator: String::new(),
+            project: String::new(),
             on_stage: false,
             planes,
             arc: arc.map(|(readings, offset)| Arc { readings, offset: if mirror { 0.0 } else { offset } }),

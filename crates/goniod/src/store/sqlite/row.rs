@@ -7,7 +7,7 @@ use sqlx::Row;
 use sqlx::sqlite::SqliteRow;
 
 use crate::store::StoreError;
-use crate::{Job, RunView, VerdictView};
+use crate::{Job, RecordView, RunView, VerdictView};
 
 pub(super) fn failed(what: &'static str) -> impl Fn(sqlx::Error) -> StoreError {
     move |source| StoreError::Query { what, source }
@@ -29,6 +29,7 @@ pub(super) fn job(row: &SqliteRow) -> Result<Job, StoreError> {
         run: column(row, "run")?,
         verdict: verdict(row)?,
         by: column(row, "submitted_by")?,
+        whole: column::<i64>(row, "whole")? != 0,
         submitted: column(row, "submitted")?,
         changed: column(row, "changed")?,
     })
@@ -42,13 +43,35 @@ pub(super) fn run(row: &SqliteRow) -> Result<RunView, StoreError> {
             .parse()
             .map_err(|why| StoreError::Damaged { what: "run", why })?,
         name: column(row, "name")?,
+        place: number(row, "place")?,
+        state: of_word(&column::<String>(row, "state")?, "run")?,
         specimen: column(row, "specimen")?,
+        record: record(row)?,
+        archived: column(row, "archived")?,
         directory: column::<String>(row, "directory")?.into(),
         started: column(row, "started")?,
         reported: column(row, "reported")?,
         verdict: verdict(row)?,
         planned: number(row, "planned")?,
         accepted: number(row, "accepted")?,
+    })
+}
+
+/// What is said of a run.
+fn record(row: &SqliteRow) -> Result<RecordView, StoreError> {
+    let tags: String = column(row, "tags")?;
+    Ok(RecordView {
+        specimen_id: column(row, "specimen_id")?,
+        material: column(row, "material")?,
+        tags: serde_json::from_str(&tags).map_err(|error| StoreError::Damaged {
+            what: "list of tags",
+            why: error.to_string(),
+        })?,
+        notes: column(row, "notes")?,
+        operator: column(row, "operator")?,
+        project: column(row, "project")?,
+        edited: column(row, "edited")?,
+        edited_by: column(row, "edited_by")?,
     })
 }
 

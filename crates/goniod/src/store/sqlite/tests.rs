@@ -2,9 +2,9 @@ use capture::Outcome;
 use tempfile::TempDir;
 
 use super::*;
-use crate::{FaultCode, JobState, VerdictView};
+use crate::{FaultCode, JobState, RecordView, VerdictView};
 
-fn end(text: &str) -> Record {
+pub(super) fn end(text: &str) -> Record {
     Record::End {
         outcome: Outcome::Failed {
             fault: text.to_owned(),
@@ -14,11 +14,11 @@ fn end(text: &str) -> Record {
     }
 }
 
-async fn with_run(store: &Sqlite) -> RunView {
-    let mut job = Job {
+pub(super) fn job_of(name: &str) -> Job {
+    Job {
         id: JobId::generate(),
         place: 0,
-        name: "job.toml".to_owned(),
+        name: name.to_owned(),
         specimen: "gold".to_owned(),
         on_stage: true,
         text: "[[plane]]".to_owned(),
@@ -26,27 +26,41 @@ async fn with_run(store: &Sqlite) -> RunView {
         why: Some("so".to_owned()),
         run: None,
         verdict: None,
+        whole: true,
         by: "me".to_owned(),
         submitted: "then".to_owned(),
         changed: "now".to_owned(),
-    };
-    store.add_job(&mut job).await.unwrap();
-    let run = RunView {
-        id: "01".to_owned(),
+    }
+}
+
+pub(super) fn run_of(job: &Job, id: &str) -> RunView {
+    RunView {
+        id: id.to_owned(),
+        place: 0,
         job: job.id,
+        state: job.state,
         name: job.name.clone(),
         specimen: job.specimen.clone(),
+        record: RecordView::default(),
+        archived: None,
         directory: "/runs/01".into(),
         started: "then".to_owned(),
         reported: None,
         verdict: None,
         planned: 3,
         accepted: 0,
-    };
-    store.begin_run(&run, &end("the header")).await.unwrap();
+    }
+}
+
+async fn with_run(store: &Sqlite) -> RunView {
+    let mut job = job_of("job.toml");
+    store.add_job(&mut job).await.unwrap();
+    let mut run = run_of(&job, "01");
+    run.record.tags = vec!["Paint".to_owned(), "reference".to_owned()];
+    store.begin_run(&mut run, &end("the header")).await.unwrap();
     job.run = Some(run.id.clone());
     assert_eq!(store.job(job.id).await.unwrap(), Some(job.clone()));
-    assert_eq!(store.jobs(0).await.unwrap(), [job]);
+    assert_eq!(store.waiting_jobs().await.unwrap(), [job]);
     run
 }
 
@@ -72,7 +86,10 @@ async fn what_was_kept_is_there_after_it_is_opened_again() {
         store.records(&run.id).await.unwrap(),
         [end("the header"), end("first")]
     );
-    assert_eq!(store.runs(9).await.unwrap(), std::slice::from_ref(&run));
+    assert_eq!(
+        store.runs(&RunQuery::latest(9)).await.unwrap(),
+        std::slice::from_ref(&run)
+    );
     let fault = store.latched().await.unwrap().expect("it is latched");
     assert_eq!((fault.code, fault.text.as_str()), (FaultCode::NoReply, "silent"));
     assert_eq!(fault.run, Some(run.id.clone()));
