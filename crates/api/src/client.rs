@@ -2,6 +2,7 @@
 
 mod error;
 mod place;
+mod post;
 mod roots;
 mod stream;
 mod unix;
@@ -18,6 +19,7 @@ use ureq::tls::TlsConfig;
 use ureq::{Agent, Body, SendBody};
 
 pub use error::{ClientError, Refused};
+pub use post::{PostError, post_json};
 pub use stream::{Message, ServerSentEvent, Stream};
 
 use crate::{Action, Job, JobId, Jog, RigView, RunView};

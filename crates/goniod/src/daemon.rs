@@ -146,6 +146,11 @@ impl Daemon {
         })
     }
 
+    /// What the handles, the queue and the worker share.
+    pub(crate) fn shared(&self) -> &Shared {
+        &self.shared
+    }
+
     /// Queues a job.
     ///
     /// # Errors

@@ -19,7 +19,7 @@ use crate::daemon::STORE;
 use crate::http::{self, Access, Address, Limits, Listener, Tokens};
 use crate::lock::Lock;
 use crate::strays::RunDirectories;
-use crate::{Daemon, DaemonError, Settings, Sqlite, Store as _};
+use crate::{Daemon, DaemonError, Settings, Sqlite, Store as _, Webhook};
 
 /// Where TCP is listened on when nothing else is said.
 const LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 4664);
@@ -51,13 +51,17 @@ struct Arguments {
     /// the data folder]
     #[arg(long, value_name = "FILE")]
     tokens: Option<PathBuf>,
+    /// File that says whom to tell what happens, see config/notify.toml [default: notify.toml in the data folder, where
+    /// there is one]
+    #[arg(long, value_name = "FILE")]
+    notify: Option<PathBuf>,
     /// Host name under which a browser asks for this daemon, besides localhost and its address; can be given several
     /// times
     #[arg(long, value_name = "NAME")]
     known_as: Vec<String>,
     /// Make a run directory of a data folder again from the store beside it, print its report as JSON (null where the store
     /// does not know the run), and end
-    #[arg(long, value_name = "RUN_DIR", conflicts_with_all = ["config", "listen", "data", "tokens", "known_as"])]
+    #[arg(long, value_name = "RUN_DIR", conflicts_with_all = ["config", "listen", "data", "tokens", "notify", "known_as"])]
     reconstruct: Option<PathBuf>,
     /// How the log on stderr is written; RUST_LOG says how much
     #[arg(long, value_enum, default_value = "human")]
@@ -185,6 +189,7 @@ async fn run(arguments: Arguments) -> anyhow::Result<()> {
     open_files();
     // Before signals are listened for: reading may block, and until then a signal ends the program by itself.
     let (rig, rig_name) = session::rig_text(arguments.config.as_deref())?;
+    let webhook = webhook(&arguments)?;
     let ended = terminated()?;
     if arguments.accept_runs {
         session::prepare_output(&arguments.data)?;
@@ -201,9 +206,24 @@ async fn run(arguments: Arguments) -> anyhow::Result<()> {
         clock: SystemTime::now,
     })
     .await?;
+    if let Some(webhook) = webhook {
+        tokio::spawn(webhook.run(daemon.clone()));
+    }
     let served = serve(&arguments, &daemon, ended).await;
     daemon.shutdown().await;
     served
+}
+
+/// Whom to tell what happens; a file that is named must be there.
+fn webhook(arguments: &Arguments) -> anyhow::Result<Option<Webhook>> {
+    match &arguments.notify {
+        Some(file) => {
+            let webhook = Webhook::read(file)?;
+            anyhow::ensure!(webhook.is_some(), "there is no notify file {}", file.display());
+            Ok(webhook)
+        }
+        None => Ok(Webhook::read(&arguments.data.join("notify.toml"))?),
+    }
 }
 
 async fn serve(
