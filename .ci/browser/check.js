@@ -132,9 +132,47 @@ try {
   await main.getByText(/\d+ readings in/).waitFor();
   await main.getByRole("button", { name: "Add to the queue" }).focus();
   await main.keyboard.press("Enter");
+  console.log("finds the button of what is wanted whole and at the head of the page, at every width");
+  await until("the tab to say what is wanted", async () => /^Specimen wanted: /.test(await main.title()));
+  const mark = () => main.locator("#icon").getAttribute("href");
+  const wanted = await mark();
+  assert.match(wanted, /^data:image\/svg/);
+  for (const width of [320, 390, 768, 1024, 1280, 1920]) {
+    await main.setViewportSize({ width, height: 844 });
+    const { button, card, over } = await main.evaluate(() => ({
+      button: document.querySelector("#wanted button").getBoundingClientRect().toJSON(),
+      card: document.querySelector("#now").getBoundingClientRect().toJSON(),
+      over: document.documentElement.scrollWidth - innerWidth,
+    }));
+    const whole = button.left >= card.left && button.right <= card.right && button.bottom < 844 / 2 && button.width > 100;
+    assert(whole && over <= 0, `${width}: ${JSON.stringify({ button, card, over })}`);
+  }
+  await main.setViewportSize(WIDE);
+
+  console.log("leaves the editor with Esc, which stops nothing there");
+  await main.locator("#job-text").focus();
+  await main.keyboard.press("Escape");
+  assert.equal(await main.locator("#submit").evaluate((details) => details.open), false);
+  assert.equal((await view()).fault, null, "no emergency stop");
+
+  console.log("gives a second job up, after a question that Esc answers with no");
+  await fetch(`${origin}/api/v1/jobs?name=second.toml`, { method: "POST", body: text,
+    headers: { Authorization: `Bearer ${token}`, "Content-Type": "application/toml" } });
+  const cancels = main.getByRole("button", { name: /^Cancel …/ });
+  await until("the second job", async () => (await cancels.count()) === 2);
+  await cancels.last().click();
+  await main.keyboard.press("Escape");
+  await main.locator("#confirm").waitFor({ state: "hidden" });
+  assert.equal((await view()).fault, null, "no emergency stop");
+  assert.equal(await cancels.count(), 2, "and nothing was given up");
+  await cancels.last().click();
+  await main.getByRole("button", { name: "Cancel the job" }).click();
+  await until("the second job to go", async () => (await cancels.count()) === 1);
   await main.getByRole("button", { name: "Specimen is on the stage" }).click();
 
   console.log("sees the arms move and the plots fill");
+  await until("the tab to say how far it is", async () => /^\d+ % /.test(await main.title()));
+  assert.notEqual(await mark(), wanted, "the icon follows");
   const before = await angle(main, "light");
   await until("the light arm to move", async () => (await angle(main, "light")) !== before);
   await until("readings in G", async () => (await dots(main, "g")) >= 30);
@@ -161,6 +199,8 @@ try {
   console.log("presses the emergency stop's key");
   await main.keyboard.press("Escape");
   await main.getByRole("alert").getByText(/Fault: estop/).waitFor();
+  await main.getByRole("alert").getByText(/What to do: Find out why/).waitFor();
+  assert.match(await main.title(), /^Fault/);
   await until("the arms to stand", async () => {
     const { job, activity, arms } = await view();
     return !job && activity === "idle" && !arms.some((arm) => arm.moving);
@@ -191,10 +231,37 @@ try {
   assert.equal(await report.locator("img").first().evaluate((img) => img.complete && img.naturalWidth > 0), true, "the report has its pictures");
   assert.equal(await report.locator("svg").count() > 0, true, "and its plots");
   await look("report");
+  const scrolls = await main.locator("#report-frame").evaluate((frame) => frame.contentDocument.documentElement.scrollHeight - frame.clientHeight);
+  assert(scrolls <= 0, `the report scrolls within the page by ${scrolls} pixels`);
+  await main.getByText("Files", { exact: true }).click();
+  const saving = main.waitForEvent("download");
+  await main.getByRole("link", { name: "readings.csv" }).click();
+  assert.match((await saving).suggestedFilename(), /^[^_]+_\d{4}-\d\d-\d\d_[0-9A-Z]{6}_readings\.csv$/);
   const files = await main.locator("#files a").allTextContents();
   assert(files.includes("brdf.binary"), files);
+  console.log("says more of the run, and finds it again by that");
+  await main.locator("#record summary").click();
+  await main.getByLabel("Tags, with commas between them").fill("paint, reference");
+  await main.getByRole("button", { name: "Save the record" }).click();
+  await main.locator("#record-edited").getByText(/It was edited/).waitFor();
+  await look("record");
   await main.getByRole("link", { name: /Back to the rig/ }).click();
+  for (const [words, found] of [["refer", 1], ["nothing like it", 0]]) {
+    await main.getByRole("searchbox").fill(words);
+    await until(`${found} runs for ${words}`, async () => (await main.locator("#run-list tr").count()) === found);
+  }
+  await main.getByRole("searchbox").fill("");
+  await main.locator("#filters summary").click();
+  await main.getByLabel("Tag", { exact: true }).fill("PAINT");
+  await until("the run by its tag", async () => (await main.locator("#run-list tr").count()) === 1);
+  await main.getByRole("button", { name: "No filters" }).click();
   await main.locator("#desk").waitFor();
+
+  console.log("is told what happened before the page was opened");
+  const later = await open({ viewport: WIDE });
+  await later.locator("#events").getByText(/: done$/).waitFor();
+  await later.locator("#events").getByText(/^.*Fault: emergency stop/).first().waitFor();
+  await later.context().close();
 
   console.log("estop is in sight wherever one has scrolled to");
   for (const page of [main, await open({ viewport: NARROW, isMobile: true })]) {

@@ -13,13 +13,14 @@ const HTML: &str = "text/html; charset=utf-8";
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// The page: what belongs to it, with path and media type. All of it is in the binary.
-const ASSETS: [(&str, &str, &str); 7] = [
+const ASSETS: [(&str, &str, &str); 8] = [
     ("/", HTML, include_str!("../../assets/index.html")),
     (
         "/assets/page.css",
         "text/css; charset=utf-8",
         include_str!("../../assets/page.css"),
     ),
+    ("/assets/now.js", SCRIPT, include_str!("../../assets/now.js")),
     ("/assets/page.js", SCRIPT, include_str!("../../assets/page.js")),
     ("/assets/plot.js", SCRIPT, include_str!("../../assets/plot.js")),
     ("/assets/rig.js", SCRIPT, include_str!("../../assets/rig.js")),
