@@ -83,6 +83,15 @@ fn job(text: &str) -> Result<(), String> {
         .map_err(|error| error.to_string())
 }
 
+/// Whether a daemon takes a file that says who is told of what.
+fn notify(text: &str) -> Result<(), String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("notify.toml");
+    fs::write(&path, text).unwrap();
+    let read = goniod::Webhook::read(&path);
+    read.map(drop).map_err(|error| error.to_string())
+}
+
 fn standard(text: &str) -> Result<(), String> {
     let parsed = report::WhiteReference::parse(text, "example");
     parsed.map(drop).map_err(|error| error.to_string())
@@ -135,7 +144,7 @@ fn every_toml_block_of_the_documents_is_taken() {
             assert_taken(
                 &path,
                 block,
-                &[job(block), rig(block), standard(block), order(block)],
+                &[job(block), rig(block), standard(block), order(block), notify(block)],
             );
             blocks += 1;
         }
@@ -210,7 +219,7 @@ fn every_key_behind_a_comment_sign_is_taken() {
                 .replace("# directions = ", "directions = ")
                 .replace("\ntheta_i_deg", "\n# theta_i_deg")
                 .replace("\ntheta_o_deg", "\n# theta_o_deg");
-            assert_taken(&path, line, &[rig(&shown), job(&shown), job(&together)]);
+            assert_taken(&path, line, &[rig(&shown), job(&shown), job(&together), notify(&shown)]);
         }
     }
 }

@@ -431,14 +431,12 @@ async fn poses_are_approached_from_the_side_that_was_asked_for() {
 #[tokio::test]
 async fn a_goal_that_is_not_taken_is_a_fault() {
     let (server, mut drive) = engaged("").await;
-    let begin = Instant::now();
     server.bench(|bench| bench.advance_to(bench.now() + Duration::from_secs(2)));
     let error = drive.travel(&[Pose::from_deg(-40.0, 40.0)]).await.unwrap_err();
     assert!(
-        error.to_string().contains("did not take the goal") && error.to_string().contains("watchdog"),
+        error.to_string().contains("did not take or keep the goal") && error.to_string().contains("watchdog"),
         "{error}"
     );
-    assert!(begin.elapsed() < Duration::from_secs(2));
     drive
         .engage_all()
         .await

@@ -10,9 +10,14 @@ use crate::{Fault, FaultKind, Rig};
 /// Pause before a request is repeated: lets time pass where a failure takes none, and a burst of noise end.
 const PAUSE: Duration = Duration::from_millis(1);
 
-/// Repetitions before a device counts as silent, however long that took: a host that stood still for a while has asked
-/// too seldom to tell.
-pub(super) const LEAST: u32 = 4;
+/// How long a host that nothing keeps waits for one reply that does not come, and a little more.
+const ASKED_ONCE: Duration = Duration::from_millis(50);
+
+/// Repetitions before a device counts as silent for so long, however long they took: as many as a host makes that nothing
+/// keeps. One that stood still for a while, or shares its processors with too many others, has asked too seldom to tell.
+pub(super) fn least(silence: Duration) -> u32 {
+    silence.div_duration_f64(ASKED_ONCE).max(4.0) as u32
+}
 
 /// A request to a rig that may be repeated.
 pub(super) type Attempt<'a, T, E> = Pin<Box<dyn Future<Output = Result<T, E>> + Send + 'a>>;
@@ -66,7 +71,7 @@ impl Patience {
         error: E,
     ) -> Result<(), DriveError<E>> {
         let tried = self.since.elapsed();
-        let silent = tried >= self.silence && self.retries >= LEAST;
+        let silent = tried >= self.silence && self.retries >= least(self.silence);
         if error.kind() != FaultKind::NoReply || silent {
             return Err(DriveError::Device {
                 what,
@@ -94,7 +99,7 @@ mod tests {
             device: Device::Sensor,
             id: 2,
         };
-        for _ in 0..LEAST {
+        for _ in 0..10 {
             tokio::time::sleep(Duration::from_millis(600)).await;
             patience
                 .spend("look", silent())
@@ -105,7 +110,7 @@ mod tests {
             .spend("look", silent())
             .await
             .expect_err("it was asked often enough");
-        assert!(error.to_string().contains("tried 5 times"), "{error}");
+        assert!(error.to_string().contains("tried 11 times"), "{error}");
     }
 
     #[tokio::test(start_paused = true)]

@@ -4,7 +4,7 @@ use arms::{Arm, ArmAngle, Envelope, Pose};
 use tokio::time::Instant;
 
 use super::rest::Looks;
-use super::retry::LEAST;
+use super::retry::least;
 use super::{Drive, DriveError, Hindrance, Rest};
 use crate::{Approach, Rig, Snapshot};
 
@@ -431,7 +431,7 @@ impl<R: Rig> Drive<R> {
                 .into_iter()
                 .find_map(|arm| Some((arm, self.other_goal(arm, &snapshot, goal)?)));
             let Some((arm, has)) = other else { return Ok(()) };
-            if since.elapsed() >= self.file.bus.silence && repeated >= LEAST {
+            if since.elapsed() >= self.file.bus.silence && repeated >= least(self.file.bus.silence) {
                 return Err(DriveError::GoalNotTaken {
                     arm,
                     goal: goal.angle(arm),
