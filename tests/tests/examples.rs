@@ -144,7 +144,13 @@ fn every_toml_block_of_the_documents_is_taken() {
             assert_taken(
                 &path,
                 block,
-                &[job(block), rig(block), standard(block), order(block), notify(block)],
+                &[
+                    job(block),
+                    rig(block),
+                    standard(block),
+                    order(block),
+                    notify(block),
+                ],
             );
             blocks += 1;
         }
@@ -219,7 +225,11 @@ fn every_key_behind_a_comment_sign_is_taken() {
                 .replace("# directions = ", "directions = ")
                 .replace("\ntheta_i_deg", "\n# theta_i_deg")
                 .replace("\ntheta_o_deg", "\n# theta_o_deg");
-            assert_taken(&path, line, &[rig(&shown), job(&shown), job(&together), notify(&shown)]);
+            assert_taken(
+                &path,
+                line,
+                &[rig(&shown), job(&shown), job(&together), notify(&shown)],
+            );
         }
     }
 }
