@@ -1,9 +1,10 @@
 use capture::{Reading, Record};
 use glam::DVec3;
-use pdv::{Model, Observation};
+use pdv::Model;
 use rig::Certificate;
 use serde_json::json;
 
+use crate::measurement::Told;
 use crate::{Check, Measurement, Readings, Run, Verdict};
 
 mod angles;
@@ -126,10 +127,13 @@ pub(crate) fn reconstruction(model: Option<&dyn Model>, no_model: Option<&str>, 
 }
 
 /// The plane and the arc cross at one pose, which was therefore measured twice: G(x) against the arc.
-pub(crate) fn crossing(plane: &[Observation], arc: &[Observation], theta_r: f64, offset: f64) -> Check {
+pub(crate) fn crossing(plane: &[Told], arc: &[Told], theta_r: f64, offset: f64) -> Check {
     let name = "plane against arc";
-    let along_plane: Vec<_> = plane.iter().map(|o| (o.deviation, o.rgb)).collect();
-    let along_arc: Vec<_> = arc.iter().map(|o| (o.theta_r, o.rgb)).collect();
+    let along_plane: Vec<_> = plane
+        .iter()
+        .map(|told| (told.at.deviation, told.value()))
+        .collect();
+    let along_arc: Vec<_> = arc.iter().map(|told| (told.at.theta_r, told.value())).collect();
     let degrees = theta_r.to_degrees();
     let (Some(g), Some(f)) = (between(along_plane, offset), between(along_arc, theta_r)) else {
         return Check {
@@ -139,48 +143,52 @@ pub(crate) fn crossing(plane: &[Observation], arc: &[Observation], theta_r: f64,
             values: json!({ "theta_r_deg": degrees }),
         };
     };
-    let difference = (2.0 * (g - f) / (g + f).max(DVec3::splat(f64::MIN_POSITIVE)))
-        .abs()
-        .max_element();
+    let apart = Apart::of(g, f, REPEAT_LIMIT);
     Check {
         name,
-        verdict: limit(difference, REPEAT_LIMIT),
+        verdict: apart.verdict(),
         text: format!(
-            "Where the plane at {degrees:.0}° and the arc cross, the same pose was measured twice; the two differ by {:.2} % (up to {:.0} % is good).",
-            100.0 * difference,
-            100.0 * REPEAT_LIMIT
+            "Where the plane at {degrees:.0}° and the arc cross, the same pose was measured twice; the two differ by {:.2} % ({}).",
+            100.0 * apart.difference,
+            apart.allowed()
         ),
-        values: json!({ "theta_r_deg": degrees, "g": g.to_array(), "arc": f.to_array(), "difference": difference }),
+        values: json!({
+            "theta_r_deg": degrees,
+            "g": g.rgb.to_array(),
+            "arc": f.rgb.to_array(),
+            "difference": apart.difference,
+            "uncertainty": apart.uncertainty,
+        }),
     }
 }
 
 /// Two planes share poses in which light and sensor have changed places (Helmholtz): the sensor of either stands where
 /// the light of the other does, on the same side of the normal and on the other.
-pub(crate) fn helmholtz(first: (&[Observation], f64), second: (&[Observation], f64)) -> Check {
+pub(crate) fn helmholtz(first: (&[Told], f64), second: (&[Told], f64)) -> Check {
     let name = "light and sensor swapped";
     let [a, b] = [first.1, second.1];
-    let at = |(plane, theta_r): (&[Observation], f64), light: f64| {
-        let readings = plane.iter().map(|o| (o.deviation, o.rgb)).collect();
+    let at = |(plane, theta_r): (&[Told], f64), light: f64| {
+        let readings = plane
+            .iter()
+            .map(|told| (told.at.deviation, told.value()))
+            .collect();
         between(readings, light.sin() + theta_r.sin())
     };
-    let pairs: Vec<(f64, DVec3, DVec3)> = [1.0, -1.0]
+    let pairs: Vec<[Value; 2]> = [1.0, -1.0]
         .into_iter()
-        .filter_map(|side| Some((side, at(first, side * b)?, at(second, side * a)?)))
+        .filter_map(|side| Some([at(first, side * b)?, at(second, side * a)?]))
         .collect();
     let degrees = [a, b].map(f64::to_degrees);
     let which = format!("The planes at {:.0}° and {:.0}°", degrees[0], degrees[1]);
     let worst = pairs
         .iter()
-        .map(|(_, f, g)| {
-            (2.0 * (*f - *g) / (*f + *g).max(DVec3::splat(f64::MIN_POSITIVE)))
-                .abs()
-                .max_element()
-        })
-        .reduce(f64::max);
+        .map(|&[f, g]| Apart::of(f, g, SIDES_LIMIT))
+        .max_by(|a, b| a.excess().total_cmp(&b.excess()));
     let values = json!({
         "theta_r_deg": degrees,
-        "difference": worst,
-        "pairs": pairs.iter().map(|(_, f, g)| [f.to_array(), g.to_array()]).collect::<Vec<_>>(),
+        "difference": worst.map(|apart| apart.difference),
+        "uncertainty": worst.map(|apart| apart.uncertainty),
+        "pairs": pairs.iter().map(|pair| pair.map(|value| value.rgb.to_array())).collect::<Vec<_>>(),
     });
     let Some(worst) = worst else {
         return Check {
@@ -192,34 +200,44 @@ pub(crate) fn helmholtz(first: (&[Observation], f64), second: (&[Observation], f
     };
     Check {
         name,
-        verdict: limit(worst, SIDES_LIMIT),
+        verdict: worst.verdict(),
         text: format!(
-            "{which} share {} poses with light and sensor swapped, interpolated between readings; they differ by {:.1} % at most (up to {:.0} % is good).",
+            "{which} share {} poses with light and sensor swapped, interpolated between readings; they differ by {:.1} % at most ({}).",
             pairs.len(),
-            100.0 * worst,
-            100.0 * SIDES_LIMIT
+            100.0 * worst.difference,
+            worst.allowed()
         ),
         values,
     }
 }
 
 /// The two sides of a plane at the same d_p: what a model that is constant along φ_p takes to be equal.
-pub(crate) fn sides(plane: &[Observation], theta_r: f64, taken_as_equal: bool) -> Check {
+pub(crate) fn sides(plane: &[Told], theta_r: f64, taken_as_equal: bool) -> Check {
     let name = "both sides of the mirror direction";
-    let side = |sign: f64| -> Vec<(f64, DVec3)> {
-        let on_side = plane.iter().filter(|o| o.deviation * sign > 0.0);
-        on_side.map(|o| (o.deviation.abs(), o.rgb)).collect()
+    let side = |sign: f64| -> Vec<(f64, Value)> {
+        let on_side = plane.iter().filter(|told| told.at.deviation * sign > 0.0);
+        on_side
+            .map(|told| (told.at.deviation.abs(), told.value()))
+            .collect()
     };
     let (inner, outer) = (side(1.0), side(-1.0));
-    let mut differences: Vec<f64> = outer
+    // Of each reading, and how unsure that is.
+    let (mut differences, mut unsure): (Vec<f64>, Vec<f64>) = outer
         .iter()
-        .filter_map(|(d_p, outwards)| {
-            let inwards = between(inner.clone(), *d_p)?;
-            let ratio = (*outwards / inwards).map(|r| r.max(f64::MIN_POSITIVE).ln().abs());
-            ratio.is_finite().then(|| ratio.max_element())
+        .filter_map(|&(d_p, outwards)| {
+            let inwards = between(inner.clone(), d_p)?;
+            let ratio = (outwards.rgb / inwards.rgb).map(|r| r.max(f64::MIN_POSITIVE).ln().abs());
+            let unsure = (outwards.u / outwards.rgb)
+                .length()
+                .max((inwards.u / inwards.rgb).length());
+            (ratio.is_finite() && unsure.is_finite()).then(|| {
+                let apart = Apart::of(outwards, inwards, SIDES_LIMIT);
+                (ratio.max_element(), apart.uncertainty)
+            })
         })
-        .collect();
+        .unzip();
     differences.sort_by(f64::total_cmp);
+    unsure.sort_by(f64::total_cmp);
     let degrees = theta_r.to_degrees();
     let Some(&median) = differences.get(differences.len() / 2) else {
         return Check {
@@ -231,10 +249,11 @@ pub(crate) fn sides(plane: &[Observation], theta_r: f64, taken_as_equal: bool) -
             values: json!({ "theta_r_deg": degrees }),
         };
     };
+    let uncertainty = unsure[unsure.len() / 2];
     Check {
         name,
         verdict: match taken_as_equal {
-            true => limit(median, SIDES_LIMIT),
+            true => limit(median, SIDES_LIMIT.max(uncertainty)),
             false => Verdict::Good,
         },
         text: format!(
@@ -247,7 +266,12 @@ pub(crate) fn sides(plane: &[Observation], theta_r: f64, taken_as_equal: bool) -
                 "has each of them for itself"
             }
         ),
-        values: json!({ "theta_r_deg": degrees, "median_log_ratio": median, "readings": differences.len() }),
+        values: json!({
+            "theta_r_deg": degrees,
+            "median_log_ratio": median,
+            "uncertainty": uncertainty,
+            "readings": differences.len(),
+        }),
     }
 }
 
@@ -317,8 +341,73 @@ fn limit(value: f64, limit: f64) -> Verdict {
     }
 }
 
-/// Value at `x` between the two nearest of `points`, linear in ln(1 + f); `None` outside of them.
-fn between(mut points: Vec<(f64, DVec3)>, x: f64) -> Option<DVec3> {
+/// A reflectance and its expanded uncertainty, k = 2, sr⁻¹.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Value {
+    rgb: DVec3,
+    u: DVec3,
+}
+
+impl Told {
+    fn value(&self) -> Value {
+        Value {
+            rgb: self.at.rgb,
+            u: self.u,
+        }
+    }
+}
+
+/// By how much two values differ that should be one, in the channel that stands out most, and how much is nothing to look
+/// at: what a good rig differs by, or what the two are uncertain by.
+#[derive(Clone, Copy, Debug)]
+struct Apart {
+    /// Relative to their mean.
+    difference: f64,
+    /// Expanded, k = 2, of that.
+    uncertainty: f64,
+    limit: f64,
+}
+
+impl Apart {
+    fn of(a: Value, b: Value, limit: f64) -> Self {
+        let mean = (0.5 * (a.rgb + b.rgb)).max(DVec3::splat(f64::MIN_POSITIVE));
+        let differences = ((a.rgb - b.rgb) / mean).abs();
+        let channel = |c: usize| Self {
+            difference: differences[c],
+            uncertainty: a.u[c].hypot(b.u[c]) / mean[c],
+            limit,
+        };
+        let channels = [channel(1), channel(2)].into_iter();
+        channels.fold(channel(0), |worst, other| {
+            if other.excess() > worst.excess() {
+                other
+            } else {
+                worst
+            }
+        })
+    }
+
+    fn excess(self) -> f64 {
+        self.difference - self.limit.max(self.uncertainty)
+    }
+
+    fn verdict(self) -> Verdict {
+        limit(self.difference, self.limit.max(self.uncertainty))
+    }
+
+    /// Up to where it is good, in words.
+    fn allowed(self) -> String {
+        if self.uncertainty > self.limit {
+            let percent = 100.0 * self.uncertainty;
+            format!("up to {percent:.1} % is within their uncertainty")
+        } else {
+            format!("up to {:.0} % is good", 100.0 * self.limit)
+        }
+    }
+}
+
+/// Value at `x` between the two nearest of `points`, linear in ln(1 + f), and as unsure as they are; `None` outside of them.
+fn between(mut points: Vec<(f64, Value)>, x: f64) -> Option<Value> {
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let at = points.partition_point(|point| point.0 < x);
     let &(x1, f1) = points.get(at)?;
@@ -327,12 +416,17 @@ fn between(mut points: Vec<(f64, DVec3)>, x: f64) -> Option<DVec3> {
     }
     let (x0, f0) = points[at.checked_sub(1)?];
     let t = (x - x0) / (x1 - x0);
-    let log = |f: DVec3| f.map(f64::ln_1p);
-    Some((log(f0) * (1.0 - t) + log(f1) * t).map(f64::exp_m1))
+    let log = |f: Value| f.rgb.map(f64::ln_1p);
+    Some(Value {
+        rgb: (log(f0) * (1.0 - t) + log(f1) * t).map(f64::exp_m1),
+        u: f0.u * (1.0 - t) + f1.u * t,
+    })
 }
 
 #[cfg(test)]
 mod tests {
+    use pdv::Observation;
+
     use super::*;
 
     #[test]
@@ -343,21 +437,29 @@ mod tests {
 
     #[test]
     fn light_and_sensor_may_be_swapped_in_a_reciprocal_specimen_only() {
-        let plane = |theta_r: f64, factor: f64| -> Vec<Observation> {
+        let plane = |theta_r: f64, factor: f64, u: f64| -> Vec<Told> {
             let material = brdf::Fitted::named("blue-rubber").unwrap();
             let at = |n: i32| Observation::of(&material, theta_r, f64::from(n) * 0.01);
             let read = (-99..199).filter_map(at);
-            read.map(|o| Observation {
-                rgb: o.rgb * factor,
-                ..o
+            read.map(|o| Told {
+                at: Observation {
+                    rgb: o.rgb * factor,
+                    ..o
+                },
+                u: o.rgb * u,
             })
             .collect()
         };
-        let (first, good, bad) = (plane(0.3, 1.0), plane(0.8, 1.0), plane(0.8, 1.3));
+        let (first, good, bad) = (plane(0.3, 1.0, 0.0), plane(0.8, 1.0, 0.0), plane(0.8, 1.3, 0.0));
+        // What is unsure by as much as it is off has nothing to look at.
+        let (unsure, rather_unsure) = (plane(0.8, 1.3, 0.4), plane(0.8, 1.3, 0.2));
         let check = helmholtz((&first, 0.3), (&good, 0.8));
         assert_eq!(check.verdict, Verdict::Good, "{}", check.text);
         assert_eq!(check.values["pairs"].as_array().unwrap().len(), 2);
-        assert_eq!(helmholtz((&first, 0.3), (&bad, 0.8)).verdict, Verdict::Look);
+        let verdict = |second: &[Told]| helmholtz((&first, 0.3), (second, 0.8)).verdict;
+        assert_eq!(verdict(&bad), Verdict::Look);
+        assert_eq!(verdict(&rather_unsure), Verdict::Look);
+        assert_eq!(verdict(&unsure), Verdict::Good);
         assert_eq!(
             helmholtz((&first, 0.3), (&bad[..1], 0.8)).verdict,
             Verdict::Unknown
@@ -366,12 +468,20 @@ mod tests {
 
     #[test]
     fn interpolation_is_exact_at_the_points_and_refuses_what_lies_outside() {
-        let points = vec![(2.0, DVec3::splat(5.0)), (1.0, DVec3::splat(3.0))];
-        assert_eq!(between(points.clone(), 1.0), Some(DVec3::splat(3.0)));
-        assert_eq!(between(points.clone(), 2.0), Some(DVec3::splat(5.0)));
+        let value = |rgb: f64, u: f64| Value {
+            rgb: DVec3::splat(rgb),
+            u: DVec3::splat(u),
+        };
+        let points = vec![(2.0, value(5.0, 0.2)), (1.0, value(3.0, 0.1))];
+        assert_eq!(between(points.clone(), 1.0), Some(value(3.0, 0.1)));
+        assert_eq!(between(points.clone(), 2.0), Some(value(5.0, 0.2)));
         assert_eq!(between(points.clone(), 0.5), None);
         assert_eq!(between(points.clone(), 2.5), None);
-        let middle = between(points, 1.5).unwrap().x;
-        assert!((middle - (24.0_f64.sqrt() - 1.0)).abs() < 1e-12, "{middle}");
+        let middle = between(points, 1.5).unwrap();
+        assert!(
+            (middle.rgb.x - (24.0_f64.sqrt() - 1.0)).abs() < 1e-12,
+            "{middle:?}"
+        );
+        assert!((middle.u.x - 0.15).abs() < 1e-12, "{middle:?}");
     }
 }

@@ -304,6 +304,26 @@ pub(crate) fn observation(
     })
 }
 
+/// What the readings of one pose tell together, and how sure that is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Told {
+    /// What was observed there.
+    pub(crate) at: Observation,
+    /// Expanded uncertainty of the reflectance, k = 2, sr⁻¹: of one of its readings, for most of it is common to them.
+    pub(crate) u: DVec3,
+}
+
+/// What one sweep tells, as [`observations`], with its uncertainty where it is known.
+pub(crate) fn told(measurements: &[Measurement], sweep: Sweep) -> Vec<Told> {
+    let of_visit = |visit: &Vec<usize>| {
+        let at = observation(measurements, visit, Measurement::rgb)?;
+        let unsure = visit.iter().filter_map(|&i| measurements[i].u);
+        let u = unsure.reduce(DVec3::max).unwrap_or_default();
+        Some(Told { at, u })
+    };
+    visits(measurements, sweep).iter().filter_map(of_visit).collect()
+}
+
 /// What one sweep observed: the readings of each pose together, those in shadow left out.
 pub fn observations(measurements: &[Measurement], sweep: Sweep) -> Vec<Observation> {
     visits(measurements, sweep)

@@ -6,10 +6,10 @@ use glam::{BVec3, DVec3};
 use pdv::{Comparison, Draw, Model, Scene, compare_within};
 use rig::RigFile;
 use serde::Serialize;
-use sweep::{Job, LeftOut};
+use sweep::{Job, LeftOut, Sweep};
 
 use crate::derive::{Sweeps, truth};
-use crate::measurement::certificate;
+use crate::measurement::{Told, certificate, told};
 use crate::{
     Adapted, Check, ExportedFile, Measurement, ModelUncertainty, MonteCarlo, Pace, ReportError, Run,
     RunDirectory, UncertaintySummary, Verdict, checks, export, measurements, outline, preview, slice,
@@ -226,9 +226,9 @@ impl Examined {
             checks::reflectance(&measurements, &job),
         ];
         checks.extend(inputs(&measurements, records, &rig));
-        checks.extend(check(&run, &job, &sweeps));
+        checks.extend(check(&run, &job, &measurements));
         if let Some(model) = &model {
-            checks.extend(check_model(model.as_ref(), &job, &sweeps, &rig));
+            checks.extend(check_model(model.as_ref(), &job, &measurements, &rig));
         }
         run.judge(Verdict::overall(&checks, run.complete()));
         Ok(Self {
@@ -325,32 +325,35 @@ fn inputs(measurements: &[Measurement], records: &[Record], rig: &RigFile) -> Ve
 }
 
 /// What the readings say of the measurement, whatever is made of them.
-fn check(run: &Run, job: &Job, sweeps: &Sweeps) -> Vec<Check> {
+fn check(run: &Run, job: &Job, measurements: &[Measurement]) -> Vec<Check> {
     let mut checks = vec![checks::bus(run)];
+    let of_planes = planes(job, measurements);
     if let Some(arc) = &job.arc {
-        let planes = job.planes.iter().zip(&sweeps.planes);
-        checks.extend(planes.map(|(plane, observations)| {
-            checks::crossing(observations, &sweeps.arc, plane.theta_r, arc.offset)
-        }));
+        let of_arc = told(measurements, Sweep::Arc);
+        let crossing =
+            |(plane, theta_r): &(Vec<Told>, f64)| checks::crossing(plane, &of_arc, *theta_r, arc.offset);
+        checks.extend(of_planes.iter().map(crossing));
     }
-    let planes: Vec<_> = job
-        .planes
-        .iter()
-        .zip(&sweeps.planes)
-        .map(|(plane, observations)| (observations.as_slice(), plane.theta_r))
-        .collect();
-    checks.extend(planes.windows(2).map(|pair| checks::helmholtz(pair[0], pair[1])));
+    let pairs = of_planes.windows(2).map(|pair| {
+        let [first, second] = [0, 1].map(|i| (pair[i].0.as_slice(), pair[i].1));
+        checks::helmholtz(first, second)
+    });
+    checks.extend(pairs);
     checks
+}
+
+/// What each plane of a job tells, and its θ_r.
+fn planes(job: &Job, measurements: &[Measurement]) -> Vec<(Vec<Told>, f64)> {
+    let plane = |(i, plane): (usize, &sweep::Plane)| (told(measurements, Sweep::Plane(i)), plane.theta_r);
+    job.planes.iter().enumerate().map(plane).collect()
 }
 
 /// What is to be said of a model. Who names another one than the usual on purpose knows what it takes for granted, and is
 /// told at worst to look: its readings may be perfectly good.
-fn check_model(model: &dyn Model, job: &Job, sweeps: &Sweeps, rig: &RigFile) -> Vec<Check> {
+fn check_model(model: &dyn Model, job: &Job, measurements: &[Measurement], rig: &RigFile) -> Vec<Check> {
     let azimuths = if model.phi_p_constant() { 1 } else { AZIMUTHS };
-    let sides = job.planes.iter().zip(&sweeps.planes);
-    let mut checks: Vec<Check> = sides
-        .map(|(plane, observations)| checks::sides(observations, plane.theta_r, model.phi_p_constant()))
-        .collect();
+    let sides = |(plane, theta_r): &(Vec<Told>, f64)| checks::sides(plane, *theta_r, model.phi_p_constant());
+    let mut checks: Vec<Check> = planes(job, measurements).iter().map(sides).collect();
     checks.push(checks::coverage(model, &rig.envelope, job.arc.is_some()));
     checks.push(checks::energy(model, job.scene.as_ref(), azimuths));
     if job.model != sweep::Model::default() {
