@@ -3,7 +3,7 @@
 
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { mkdtempSync, readFileSync, rmSync, statSync, writeFileSync } from "node:fs";
 import { createServer, request as forward } from "node:http";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
@@ -239,6 +239,19 @@ try {
   assert.match((await saving).suggestedFilename(), /^[^_]+_\d{4}-\d\d-\d\d_[0-9A-Z]{6}_readings\.csv$/);
   const files = await main.locator("#files a").allTextContents();
   assert(files.includes("brdf.binary"), files);
+  console.log("saves the result in another format, and all of them");
+  await main.getByText("In other formats", { exact: true }).click();
+  const saved = async (format) => {
+    const made = main.waitForEvent("download", { timeout: LONG });
+    await main.locator("#exports").getByRole("link", { name: format, exact: true }).click();
+    return made;
+  };
+  const merl = await saved("merl");
+  assert.match(merl.suggestedFilename(), /\.binary$/);
+  assert(statSync(await merl.path()).size > 10_000, "the file holds something");
+  const all = await saved("all");
+  assert.match(all.suggestedFilename(), /\.zip$/);
+  await all.cancel();
   console.log("says more of the run, and finds it again by that");
   await main.locator("#record summary").click();
   await main.getByLabel("Tags, with commas between them").fill("paint, reference");

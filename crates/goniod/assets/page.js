@@ -77,6 +77,21 @@ async function act(what, method, path, body) {
   }
 }
 
+// Saves what is made when it is asked for. A refusal is told, not saved.
+async function save(what, path) {
+  notice(`${what} is being made and checked.`);
+  try {
+    const response = await answered("GET", path);
+    const name = response.headers.get("Content-Disposition")?.match(/filename="([^"]+)"/)?.[1] ?? what;
+    const url = URL.createObjectURL(await response.blob());
+    node("a", { href: url, download: name }).click();
+    setTimeout(() => URL.revokeObjectURL(url), 60_000);
+    notice();
+  } catch (error) {
+    notice(`${what}: ${error.message}`);
+  }
+}
+
 function notice(text) {
   $("notice").hidden = !text;
   $("notice").textContent = text ?? "";
@@ -486,6 +501,14 @@ async function route() {
     const files = await ask("GET", `/runs/${id}/files`);
     $("files").replaceChildren(...files.map(({ name, bytes, made }) =>
       node("li", {}, node("a", { href: `${at}/${name}`, download: "" }, name), ` ${size(bytes)}${made ? ", made when asked for" : ""}`)));
+    const formats = await ask("GET", `/runs/${id}/exports`);
+    $("exports").replaceChildren(...formats.map(({ format, about }) => {
+      const path = `/runs/${id}/exports/${format}`;
+      const link = node("a", { href: API + path, download: "" }, format);
+      // An archive of all is sent as it is made, and may be large: it is the browser's to save.
+      if (format !== "all") link.onclick = (event) => { event.preventDefault(); save(format, path); };
+      return node("li", {}, link, `: ${about}`);
+    }));
     $("report-title").focus();
   } catch (error) {
     notice(`This run cannot be shown: ${error.message}`);
