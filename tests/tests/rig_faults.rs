@@ -181,6 +181,22 @@ async fn a_refused_trigger_is_a_fault() {
     assert_eq!(sequence(&server), 0);
 }
 
+/// As on a host that shares its processors with many others: late with everything, and by more than any reply is waited for.
+#[tokio::test]
+async fn replies_that_all_come_late_are_waited_for() {
+    for late_ms in [80, 150, 300] {
+        let (server, mut drive) = engaged("").await;
+        server.faults(|faults| {
+            faults.late_reply = 1.0;
+            faults.late_by = Duration::from_millis(late_ms);
+        });
+        for look in 0..4 {
+            let seen = drive.snapshot().await;
+            assert!(seen.is_ok(), "{late_ms} ms late, look {look}: {seen:?}");
+        }
+    }
+}
+
 /// What is read singly after a late reply of the same length: goal and position differ, since the arm is stuck.
 #[tokio::test]
 async fn a_late_reply_is_not_taken_for_the_next() {

@@ -1,4 +1,4 @@
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,6 +23,14 @@ const HOST_MARGIN: Duration = Duration::from_millis(30);
 /// The port waits for whole milliseconds: two of a slice.
 const SLICE: Duration = Duration::from_millis(3);
 const SLICES: u32 = (HOST_MARGIN.as_millis() / 2) as u32;
+
+/// Where replies came after they were given up, those of the requests that follow are waited for longer: by this factor each
+/// time, and at most so many times as long. A host that shares its processors with too many others is late with every reply
+/// by about as much, and would never hear one.
+const LONGER: u32 = 4;
+const LONGEST: u32 = 16;
+/// Late replies that are looked for at once.
+const LATE_MAX: usize = 8;
 
 /// No reply comes later than this after its request. ROBOTIS' SDK gives up 34 ms after the last byte is due, and
 /// nobody reports replies that it missed; this is half as much again.
@@ -111,8 +119,14 @@ pub(super) struct Line {
     quiet_until: Option<Instant>,
     /// Ids of which a reply may still be under way.
     suspects: BTreeSet<u8>,
+    /// How many of the pings by which an id was to catch up it may still answer.
+    pinged: BTreeMap<u8, u32>,
     /// Slices of [`HOST_MARGIN`] that are left of the request in hand.
     slices: u32,
+    /// Id whose reply was last given up since it did not come.
+    given_up: Option<u8>,
+    /// How many times as long as on an idle host a reply is waited for, 1 … [`LONGEST`].
+    patience: u32,
 }
 
 impl Line {
@@ -132,7 +146,10 @@ impl Line {
             settings: settings.clone(),
             quiet_until: None,
             slices: 0,
+            given_up: None,
+            patience: 1,
             suspects: BTreeSet::new(),
+            pinged: BTreeMap::new(),
         })
     }
 
@@ -141,8 +158,23 @@ impl Line {
         if let Some(quiet) = self.quiet_until.take() {
             std::thread::sleep(quiet.saturating_duration_since(Instant::now()));
         }
+        self.listen();
         let started = Instant::now();
         let result = self.attempt(request);
+        if result.is_ok() {
+            self.patience = (self.patience - 1).max(1);
+            // They answer in order, so nothing is owed from before.
+            for (id, _) in &request.replies {
+                self.pinged.remove(id);
+            }
+        }
+        self.given_up = match &result {
+            Err(Failure {
+                id,
+                cause: Cause::Silence,
+            }) => Some(*id),
+            _ => None,
+        };
         if let Err(Failure { id, cause }) = &result {
             tracing::debug!(id, ?cause, port = %self.path.display(), "transaction failed");
             if matches!(cause, Cause::Silence | Cause::Damage(_)) {
@@ -158,6 +190,28 @@ impl Line {
         result
     }
 
+    /// Hears what came of the last request after it was given up, which sending would throw away.
+    fn listen(&mut self) {
+        for _ in 0..LATE_MAX {
+            if self.given_up.is_none() {
+                return;
+            }
+            match self.receive_by(Instant::now() + Duration::from_millis(1)) {
+                Ok((answered, _)) if self.given_up == Some(answered) => self.heard_late(),
+                // Of a device that was asked together with that one, and answered after it should have.
+                Ok(_) => {}
+                Err(_) => return,
+            }
+        }
+    }
+
+    /// A reply that was given up has come: it was the host that was late.
+    fn heard_late(&mut self) {
+        self.patience = (self.patience * LONGER).min(LONGEST);
+        self.slices = SLICES * self.patience;
+        tracing::debug!(patience = self.patience, "a reply came after it was given up");
+    }
+
     fn attempt(&mut self, request: &Request) -> Result<Vec<Reply>, Failure> {
         for &(id, _) in &request.replies {
             if self.suspects.contains(&id) {
@@ -171,9 +225,16 @@ impl Line {
         })?;
         let mut replies = Vec::with_capacity(request.replies.len());
         for &(id, count) in &request.replies {
-            let (answered, said) = self
-                .receive_fresh(deadline)
-                .map_err(|cause| Failure { id, cause })?;
+            let (answered, said) = loop {
+                let (answered, said) = self
+                    .receive_fresh(deadline)
+                    .map_err(|cause| Failure { id, cause })?;
+                let asked = answered == id && count == PING_REPLY;
+                if asked || !self.is_late_ping(answered, &said) {
+                    break (answered, said);
+                }
+                self.heard_late();
+            };
             let cause = match said {
                 Ok(reply) if answered == id && reply.parameters.len() == count => {
                     replies.push(reply);
@@ -203,16 +264,35 @@ impl Line {
             replies: vec![(id, PING_REPLY)],
         };
         let deadline = self.send(&ping)?;
+        *self.pinged.entry(id).or_default() += 1;
         loop {
             // Damage is not passed over: of a reply that claims to be too long, the crate tells again and again.
             match self.receive(deadline)? {
                 (answered, Ok(reply)) if answered == id && reply.parameters.len() == PING_REPLY => {
+                    self.pinged
+                        .entry(id)
+                        .and_modify(|owed| *owed = owed.saturating_sub(1));
                     return Ok(());
                 }
+                (answered, said) if self.is_late_ping(answered, &said) => self.heard_late(),
                 (answered, _) if !self.suspects.contains(&answered) => return Err(stranger(answered)),
+                (answered, Ok(reply))
+                    if self.given_up == Some(answered) && reply.parameters.len() != PING_REPLY =>
+                {
+                    self.heard_late();
+                }
                 _ => {}
             }
         }
+    }
+
+    /// Whether this is the answer to a ping of before, which is then no longer owed.
+    fn is_late_ping(&mut self, answered: u8, said: &Result<Reply, u8>) -> bool {
+        let form = said
+            .as_ref()
+            .is_ok_and(|reply| reply.parameters.len() == PING_REPLY);
+        let owed = self.pinged.get_mut(&answered).filter(|owed| form && **owed > 0);
+        owed.map(|owed| *owed -= 1).is_some()
     }
 
     /// The next status packet of a device that owes none. Those whom the request in hand asks have caught up; what a
@@ -264,7 +344,7 @@ impl Line {
             .map_err(write_cause)?;
         let sent = INSTRUCTION_OVERHEAD + parameters.len() + stuffing(parameters);
         let deadline = Instant::now() + self.reply_time(sent, request);
-        self.slices = SLICES;
+        self.slices = SLICES * self.patience;
         if let Some(echo) = &mut self.echo {
             skip_echo(echo, sent, deadline + HOST_MARGIN).map_err(io_cause)?;
         }
