@@ -195,6 +195,7 @@ mod tests {
                         ("PlaneTable", "readings") => "theta_r_deg = 1.0\n",
                         ("PlaneTable", _) => "readings = 2\n",
                         ("ArcTable", "offset") => "readings = 2\n",
+                        ("SweepTable", "passes") => "mode = \"fly\"\n",
                         _ => "",
                     };
                     let planes = if table == "PlaneTable" { "" } else { JOB };
@@ -208,6 +209,6 @@ mod tests {
                 }
             }
         }
-        assert_eq!(tried, 14, "two sides of seven keys");
+        assert_eq!(tried, 16, "two sides of eight keys");
     }
 }
