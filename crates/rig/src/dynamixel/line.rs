@@ -24,11 +24,10 @@ const HOST_MARGIN: Duration = Duration::from_millis(30);
 const SLICE: Duration = Duration::from_millis(3);
 const SLICES: u32 = (HOST_MARGIN.as_millis() / 2) as u32;
 
-/// Where replies came after they were given up, those of the requests that follow are waited for longer: by this factor each
-/// time, and at most so many times as long. A host that shares its processors with too many others is late with every reply
-/// by about as much, and would never hear one.
-const LONGER: u32 = 4;
-const LONGEST: u32 = 16;
+/// Where replies came after they were given up, those of the requests that follow are waited for so many times as long: a host
+/// that shares its processors with too many others is late with every reply by about as much, and would never hear one. Three
+/// devices that must catch up and one request take less than a usual bus watchdog, a second, at that.
+const LONGEST: u32 = 6;
 /// Late replies that are looked for at once.
 const LATE_MAX: usize = 8;
 
@@ -207,7 +206,7 @@ impl Line {
 
     /// A reply that was given up has come: it was the host that was late.
     fn heard_late(&mut self) {
-        self.patience = (self.patience * LONGER).min(LONGEST);
+        self.patience = LONGEST;
         self.slices = SLICES * self.patience;
         tracing::debug!(patience = self.patience, "a reply came after it was given up");
     }
