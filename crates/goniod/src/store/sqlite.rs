@@ -24,7 +24,7 @@ mod tests;
 
 pub(crate) use copy::has_log;
 pub use copy::{backup, restore};
-use row::{column, failed, job, json, kind, number, of_word, run, word};
+use row::{column, failed, job, json, kind, number, of_word, run, sum, word};
 
 /// How long a statement waits for another program that holds the database.
 const BUSY: Duration = Duration::from_secs(2);
@@ -96,6 +96,7 @@ fn migrations() -> Migrator {
         ("queue", include_str!("0001_queue.sql")),
         ("verdict", include_str!("0002_verdict.sql")),
         ("history", include_str!("0003_history.sql")),
+        ("sums", include_str!("0004_sums.sql")),
     ];
     let migration = |(version, (description, sql)): (i64, (&'static str, &'static str))| {
         let description = Cow::Borrowed(description);
@@ -222,10 +223,12 @@ impl Store for Sqlite {
         .map_err(failed())?;
         run.place = number(&row, "place")?;
         history::describe(&mut transaction, run).await.map_err(failed())?;
-        sqlx::query("INSERT INTO records (run, seq, kind, body) VALUES ($1, 0, $2, $3)")
+        let body = json(header);
+        sqlx::query("INSERT INTO records (run, seq, kind, body, sum) VALUES ($1, 0, $2, $3, $4)")
             .bind(&run.id)
             .bind(kind(header))
-            .bind(json(header))
+            .bind(&body)
+            .bind(sum(&run.id, 0, &body))
             .execute(&mut *transaction)
             .await
             .map_err(failed())?;
@@ -315,8 +318,10 @@ impl Store for Sqlite {
                 .await
                 .map_err(recorded())?;
         }
+        let body = json(record);
         sqlx::query(
-            "INSERT INTO records (run, seq, kind, step, attempt, accepted, body) VALUES ($1, $2, $3, $4, $5, $6, $7)",
+            "INSERT INTO records (run, seq, kind, step, attempt, accepted, body, sum) \
+             VALUES ($1, $2, $3, $4, $5, $6, $7, $8)",
         )
         .bind(run)
         .bind(seq as i64)
@@ -324,7 +329,8 @@ impl Store for Sqlite {
         .bind(reading.map(|reading| reading.step as i64))
         .bind(reading.map(|reading| i64::from(reading.attempt)))
         .bind(reading.map(|reading| i64::from(reading.accepted)))
-        .bind(json(record))
+        .bind(&body)
+        .bind(sum(run, seq, &body))
         .execute(&mut *transaction)
         .await
         .map_err(recorded())?;
@@ -332,19 +338,28 @@ impl Store for Sqlite {
     }
 
     async fn records(&self, run: &str) -> Result<Vec<Record>, StoreError> {
-        let rows = sqlx::query("SELECT body FROM records WHERE run = $1 ORDER BY seq")
+        let rows = sqlx::query("SELECT seq, body, sum FROM records WHERE run = $1 ORDER BY seq")
             .bind(run)
             .fetch_all(&self.reader)
             .await
             .map_err(failed("read a journal"))?;
-        let record = |row: &SqliteRow| {
-            let body: String = column(row, "body")?;
-            serde_json::from_str(&body).map_err(|error| StoreError::Damaged {
+        let record = |(place, row): (u64, &SqliteRow)| {
+            let damaged = |why: String| StoreError::Damaged {
                 what: "record",
-                why: error.to_string(),
-            })
+                why: format!("record {place} of run {run}: {why}"),
+            };
+            let seq = number(row, "seq")?;
+            let body: String = column(row, "body")?;
+            let stored: Option<i64> = column(row, "sum")?;
+            if seq != place {
+                return Err(damaged(format!("it is missing, {seq} stands in its place")));
+            }
+            if stored.is_some_and(|stored| stored != sum(run, seq, &body)) {
+                return Err(damaged("it is not what was written, by its checksum".to_owned()));
+            }
+            serde_json::from_str(&body).map_err(|error| damaged(error.to_string()))
         };
-        rows.iter().map(record).collect()
+        (0..).zip(&rows).map(record).collect()
     }
 
     async fn latched(&self) -> Result<Option<FaultView>, StoreError> {

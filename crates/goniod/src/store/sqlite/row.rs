@@ -112,6 +112,17 @@ pub(super) fn json(value: &impl Serialize) -> String {
     serde_json::to_string(value).expect("our own types have string keys only")
 }
 
+/// Checksum of a record: of its text, and of where it belongs.
+pub(super) fn sum(run: &str, seq: u64, body: &str) -> i64 {
+    let mut digest = SUM.digest();
+    for part in [run.as_bytes(), &seq.to_le_bytes(), body.as_bytes()] {
+        digest.update(part);
+    }
+    digest.finalize().into()
+}
+
+const SUM: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+
 pub(super) fn kind(record: &Record) -> &'static str {
     match record {
         Record::Header(_) => "header",

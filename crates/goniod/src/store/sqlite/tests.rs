@@ -187,11 +187,12 @@ async fn kept(path: &std::path::Path, records: u64) -> Vec<Record> {
 }
 
 #[tokio::test]
-async fn forty_flipped_bits_are_told_when_the_store_is_opened() {
+async fn forty_flipped_bits_are_told_or_touch_nothing_that_was_measured() {
     use rand::{RngExt, SeedableRng};
     let folder = TempDir::new().unwrap();
     let sound = folder.path().join("sound.db");
-    kept(&sound, 200).await;
+    let written = kept(&sound, 200).await;
+    let mut told = 0;
     let bytes = std::fs::read(&sound).unwrap();
     let first: u64 = rand::rng().random_range(0..1 << 32);
     for seed in first..first + 20 {
@@ -203,14 +204,58 @@ async fn forty_flipped_bits_are_told_when_the_store_is_opened() {
         }
         let path = folder.path().join(format!("{seed}.db"));
         std::fs::write(&path, flipped).unwrap();
-        let error = Sqlite::open(&path)
+        match Sqlite::open(&path).await {
+            Err(error) => {
+                told += 1;
+                let text = error.to_string();
+                assert!(
+                    text.contains(&seed.to_string()),
+                    "seed {seed}: it names the file: {text}"
+                );
+            }
+            // They lie where nothing is kept, or in a record, whose checksum tells.
+            Ok(store) => {
+                if let Ok(read) = store.records("01").await {
+                    assert!(read.is_empty() || read == written, "seed {seed}");
+                }
+                store.close().await;
+            }
+        }
+    }
+    assert!(
+        told >= 15,
+        "seed {first}: {told} of 20 were told when the store was opened"
+    );
+}
+
+#[tokio::test]
+async fn a_record_that_is_not_what_was_written_or_is_missing_is_told() {
+    let spoil = [
+        (
+            "UPDATE records SET body = replace(body, 'record 7', 'record 8') WHERE seq = 7",
+            "record 7 of run 01",
+        ),
+        (
+            "UPDATE records SET run = '02' WHERE seq = 9",
+            "record 9 of run 01: it is missing",
+        ),
+        (
+            "DELETE FROM records WHERE seq = 4",
+            "record 4 of run 01: it is missing",
+        ),
+    ];
+    for (statement, words) in spoil {
+        let folder = TempDir::new().unwrap();
+        let path = folder.path().join("goniod.db");
+        kept(&path, 20).await;
+        let store = Sqlite::open(&path).await.unwrap();
+        sqlx::query("PRAGMA foreign_keys = OFF")
+            .execute(&store.writer)
             .await
-            .expect_err(&format!("seed {seed}"))
-            .to_string();
-        assert!(
-            error.contains(&seed.to_string()),
-            "seed {seed}: it names the file: {error}"
-        );
+            .unwrap();
+        sqlx::query(statement).execute(&store.writer).await.unwrap();
+        let error = store.records("01").await.unwrap_err().to_string();
+        assert!(error.contains(words), "{statement}: {error}");
     }
 }
 
