@@ -55,8 +55,9 @@ pub struct Imperfections {
 }
 
 impl Imperfections {
-    /// A modest but decent instrument: 0.1 % on a white specimen, a few percent on a black one away from its lobe. What
-    /// only a calibration can remove is 0: the rig file is taken to be right.
+    /// A modest but decent photometer: 0.1 % on a white specimen, a few percent on a black one away from its lobe. What
+    /// only a calibration can remove is 0: the rig file is taken to be right. Servos of the X series as they are delivered:
+    /// play by the e-manual ("Specifications", backlash 15 arcmin), lag by the factory's gains (docs/servos.md).
     pub const DEFAULT: Self = Self {
         shot_noise_electrons: 64.0,
         read_noise_counts: 3.0,
@@ -72,9 +73,9 @@ impl Imperfections {
         lamp_flicker: 0.001,
         source_aperture_deg: 0.25,
         detector_aperture_deg: 0.25,
-        light_backlash_deg: 0.02,
-        sensor_backlash_deg: 0.02,
-        following_lag: Duration::from_millis(8),
+        light_backlash_deg: 0.25,
+        sensor_backlash_deg: 0.25,
+        following_lag: Duration::from_millis(45),
         responsivity_error: 0.0,
         gain_error: 0.0,
         nonlinearity: 0.0,

@@ -31,8 +31,12 @@ pub struct Mechanics {
 }
 
 impl Mechanics {
-    /// For now an ideal one.
-    pub const DEFAULT: Self = Self::NONE;
+    /// A decent servo of the X series as it is delivered: friction takes three counts, and it trembles by one.
+    pub const DEFAULT: Self = Self {
+        static_error_counts: 3.0,
+        jitter_counts: 1.0,
+        ..Self::NONE
+    };
 
     /// Nothing departs.
     pub const NONE: Self = Self {

@@ -68,7 +68,8 @@ fn the_simulator_passes_and_is_left_at_rest() {
     assert_eq!(lamp, [0], "the lamp was left on");
     let pose = simulator.server.bench(|bench| bench.pose());
     assert!(
-        (pose.light.deg() + 45.0).abs() < 0.3 && (pose.sensor.deg() - 45.0).abs() < 0.3,
+        // Near enough, half a degree, by encoders that have half of a play of 0.25° beside them.
+        (pose.light.deg() + 45.0).abs() < 0.65 && (pose.sensor.deg() - 45.0).abs() < 0.65,
         "{pose:?}"
     );
 }

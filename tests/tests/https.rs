@@ -150,7 +150,7 @@ fn gonioctl_works_through_a_tls_proxy_below_a_path() {
         .strip_prefix("light arm at ")
         .and_then(|rest| rest.split('°').next());
     let angle: f64 = angle.unwrap().parse().unwrap();
-    assert!((angle + 40.0).abs() < 0.2, "{}", moved.stderr);
+    assert!((angle + 40.0).abs() <= 0.5, "{}", moved.stderr);
 }
 
 #[test]

@@ -30,6 +30,17 @@ fn torque(server: &Server, device: Device) -> u8 {
     server.bench(|bench| bench.device(device).read(64, 1).unwrap()[0])
 }
 
+/// Asserts that the arms stand where they stood, but for a servo's tremble of a count.
+fn assert_holds(server: &Server, start: Pose, why: &str) {
+    let now = server.bench(|bench| bench.pose());
+    for (now, start) in [(now.light, start.light), (now.sensor, start.sensor)] {
+        assert!(
+            (now - start).abs().to_degrees() < 0.1,
+            "{why}: {now:?}, {start:?}"
+        );
+    }
+}
+
 #[tokio::test]
 async fn nothing_moves_until_it_is_told_to() {
     let (server, mut drive) = rig("");
@@ -54,19 +65,11 @@ async fn nothing_moves_until_it_is_told_to() {
             .iter()
             .all(|location| location.torque && !location.moving)
     );
-    assert_eq!(
-        server.bench(|bench| bench.pose()),
-        start,
-        "engaging holds the arms"
-    );
+    assert_holds(&server, start, "engaging holds the arms");
 
     drive.disengage_all().await;
     server.bench(|bench| bench.advance_to(bench.now() + Duration::from_secs(5)));
-    assert_eq!(
-        server.bench(|bench| bench.pose()),
-        start,
-        "no watchdog trips after disengaging"
-    );
+    assert_holds(&server, start, "no watchdog trips after disengaging");
     assert_eq!(torque(&server, Device::Light), 1, "estop = \"hold\" holds");
 }
 

@@ -392,12 +392,12 @@ fn arms_go_by_hand_within_the_envelope() {
     let service = Service::start(&["--listen", "127.0.0.1:0"]);
     let angle = |rig: &Value, arm: usize| rig["arms"][arm]["measured_deg"].as_f64().unwrap();
     let rig = service.rig(&["jog", "light", "-40"]);
-    assert!((angle(&rig, 0) + 40.0).abs() < 0.2, "{rig:#}");
+    assert!((angle(&rig, 0) + 40.0).abs() <= 0.5, "{rig:#}");
     let outside = service.gonioctl(&["jog", "light", "-89.5"]).expect(2);
     assert!(outside.stderr.contains("-88"), "{}", outside.stderr);
     let _ = service.gonioctl(&["jog", "lamp", "10"]).expect(2);
     let rig = service.rig(&["park"]);
-    assert!((angle(&rig, 0) + 45.0).abs() < 0.2, "{rig:#}");
+    assert!((angle(&rig, 0) + 45.0).abs() <= 0.5, "{rig:#}");
 }
 
 #[test]

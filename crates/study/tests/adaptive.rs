@@ -11,9 +11,11 @@ use sweep::Job;
 const FIRST: &str = "[[plane]]\ntheta_r_deg = 20\nreadings = 16\ndistribution = \"lobe\"\n[[plane]]\ntheta_r_deg = 70\n\
     readings = 16\ndistribution = \"lobe\"\n[arc]\nreadings = 8\n[reconstruction]\nmodel = \"planes\"\n";
 
-/// A rig whose file knows the play of its simulated gears.
+/// A rig with good arms, whose file knows the play of their gears.
 fn rig() -> RigFile {
-    RigFile::parse("[uncertainty]\nplay_deg = 0.02", "rig.toml".as_ref()).expect("a good rig file")
+    let text = "[motion]\nlate_ms = 0\n[uncertainty]\nplay_deg = 0.02\n[sim]\nlight_backlash_deg = 0.02\n\
+                sensor_backlash_deg = 0.02\nfollowing_lag_ms = 8\nstatic_error_counts = 0\njitter_counts = 0\n";
+    RigFile::parse(text, "rig.toml".as_ref()).expect("a good rig file")
 }
 
 fn captured(material: &Fitted, rest: &str) -> Measured {

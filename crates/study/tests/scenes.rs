@@ -12,10 +12,11 @@ const SCENE: &str = "[scene]\ntheta_i_deg = [0, 60]\ntheta_o_deg = [0, 60]\n";
 /// A job that names no sweep.
 const OPEN: &str = "[reconstruction]\nmodel = \"planes\"\n";
 
-/// A rig whose file knows how good its simulated arms are, and the pairs over which errors are means.
+/// A rig with good arms, whose file knows how good they are, and the pairs over which errors are means.
 fn bench() -> (RigFile, Draw) {
     let rig = RigFile::parse(
-        "[uncertainty]\nplay_deg = 0.02\nencoder_deg = 0.0\ntilt_deg = 0.0",
+        "[motion]\nlate_ms = 0\n[uncertainty]\nplay_deg = 0.02\nencoder_deg = 0.0\ntilt_deg = 0.0\n[sim]\nlight_backlash_deg = 0.02\nsensor_backlash_deg = 0.02\n\
+         following_lag_ms = 8\nstatic_error_counts = 0\njitter_counts = 0\n",
         "rig.toml".as_ref(),
     )
     .expect("a good rig file");

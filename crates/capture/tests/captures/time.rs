@@ -72,7 +72,9 @@ async fn very_slow_and_very_fast_arms_measure_the_same_in_the_time_that_was_plan
     for velocity in [1.4, 270.0] {
         for acceleration in [21.5, 100_000.0] {
             let arm = format!("velocity_deg_s = {velocity}\nacceleration_deg_s2 = {acceleration}\n");
-            let text = format!("[light]\n{arm}[sensor]\n{arm}[sim]\nimperfections = \"none\"");
+            let text = format!(
+                "[motion]\nlate_ms = 0\n[light]\n{arm}[sensor]\n{arm}[sim]\nimperfections = \"none\""
+            );
             let file = RigFile::parse(&text, "test.toml".as_ref()).expect("a good rig file");
             let mut scene = Scene::on(file, SHORT).await;
             let before = scene.bench.now();

@@ -8,7 +8,7 @@ use report::{WhiteReference, measurements, model};
 use rig::{Certified, RigFile};
 use sweep::{Job, Sweep};
 
-use crate::bench::Laboratory;
+use crate::bench::{FINE_SERVOS, Laboratory};
 
 /// The model takes the least for granted that a Lambertian specimen would not show: what is judged here is calibration.
 const JOB: &str = "[reconstruction]\nmodel = \"separable\"\n[[plane]]\ntheta_r_deg = 45\nreadings = 60\ndistribution = \"uniform\"\n[arc]\nreadings = 40";
@@ -46,7 +46,7 @@ fn certified(at: &[[f64; 2]]) -> WhiteReference {
     }
 }
 
-/// Every imperfection there is, and with it what only a calibration finds.
+/// Every imperfection there is of light and photometer, and with it what only a calibration finds.
 const EVERYTHING: &str = "imperfections = \"default\"\nresponsivity_error = 0.07\ngain_error = 0.012\n\
      nonlinearity = 0.004\ncrosstalk = 0.05\nlamp_trend_per_h = -0.05\nlight_zero_deg = 0.12\n\
      sensor_zero_deg = 0.08\nstray_per_sr = 0.0005\n";
@@ -78,7 +78,7 @@ fn worst(records: &[Record], file: &RigFile) -> f64 {
 #[tokio::test(start_paused = true)]
 async fn a_calibrated_rig_is_right_to_half_a_percent_with_every_imperfection() {
     for filling in ["over", "under"] {
-        let text = format!("{PATIENT}filling = \"{filling}\"\n[sim]\n{EVERYTHING}");
+        let text = format!("{PATIENT}filling = \"{filling}\"\n[sim]\n{FINE_SERVOS}{EVERYTHING}");
         let mut laboratory = Laboratory::new(&text);
         let specimen = || -> Arc<dyn Brdf> { Arc::new(Lambert::new(ALBEDO).unwrap()) };
         let before = worst(&laboratory.measure(specimen(), JOB).await, &laboratory.file);
@@ -97,7 +97,7 @@ async fn a_calibrated_rig_is_right_to_half_a_percent_with_every_imperfection() {
 
 #[tokio::test(start_paused = true)]
 async fn one_certified_geometry_is_enough() {
-    let mut laboratory = Laboratory::new(&format!("{PATIENT}[sim]\n{EVERYTHING}"));
+    let mut laboratory = Laboratory::new(&format!("{PATIENT}[sim]\n{FINE_SERVOS}{EVERYTHING}"));
     laboratory
         .calibrate_all(&certified(&[[-45.0, 0.0]]), Arc::new(Ptfe))
         .await;
@@ -118,7 +118,7 @@ async fn lamp_and_dark_drift_cost_less_than_a_percent() {
     for (lamp, wobble) in lamps {
         let text = format!(
             "[motion]\nsettle_ms = 5000\ntimeout_ms = 10000\n{PATIENT}lamp = \"{lamp}\"\ndark_every_min = 3\n\
-             reference_every_min = 1\n[sim]\n{EVERYTHING}\ndark_counts_per_s = 2000\nself_heating_c = 16\n{wobble}"
+             reference_every_min = 1\n[sim]\n{FINE_SERVOS}{EVERYTHING}\ndark_counts_per_s = 2000\nself_heating_c = 16\n{wobble}"
         );
         let mut laboratory = Laboratory::new(&text);
         laboratory

@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use report::{Standard, measurements};
 
-use crate::bench::Laboratory;
+use crate::bench::{FINE_SERVOS, Laboratory};
 
 const JOB: &str = "[[plane]]\ntheta_r_deg = 40\nreadings = 20\n[arc]\nreadings = 20";
 /// Rigs, each with zeros of its own.
@@ -76,7 +76,8 @@ async fn after_a_mirror_errors_are_as_large_as_stated_and_no_larger() {
 
 #[tokio::test(start_paused = true)]
 async fn a_mirror_leaves_the_difference_of_the_zeros_as_unsure_as_it_was() {
-    let mut laboratory = Laboratory::new("[sim]\nlight_zero_deg = 0.1\nsensor_zero_deg = -0.1\n");
+    let rig = format!("[sim]\n{FINE_SERVOS}light_zero_deg = 0.1\nsensor_zero_deg = -0.1\n");
+    let mut laboratory = Laboratory::new(&rig);
     let before = laboratory.certificate.u_zero(&laboratory.file);
     let on_stage = brdf::specimen(&Standard::Mirror.simulated().expect("known")).expect("known");
     laboratory.calibrate(&Standard::Mirror, on_stage).await;

@@ -13,7 +13,7 @@ use rand_distr::{Distribution, StandardNormal};
 use report::measurements;
 use sweep::Light;
 
-use crate::bench::Laboratory;
+use crate::bench::{FINE_SERVOS, Laboratory};
 
 const JOB: &str = "[[plane]]\ntheta_r_deg = 45\nreadings = 160\ndistribution = \"uniform\"";
 /// Rigs, each wrong in its own way.
@@ -106,7 +106,7 @@ async fn one(seed: u64, tally: &mut Tally) {
     let mut normal = || -> f64 { StandardNormal.sample(&mut random) };
     let text = format!(
         "[uncertainty]\nresponsivity_percent = 0.2\ngain_percent = 0.1\nnonlinearity_percent = 0.1\n\
-         crosstalk_percent = 0.0\nangle_deg = 0.01\nplay_deg = 0.02\nencoder_deg = 0.0\ntilt_deg = 0.0\n[sim]\nseed = {}\nresponsivity_error = {}\nlight_zero_deg = {}\n\
+         crosstalk_percent = 0.0\nangle_deg = 0.01\nplay_deg = 0.02\nencoder_deg = 0.0\ntilt_deg = 0.0\n[sim]\n{FINE_SERVOS}seed = {}\nresponsivity_error = {}\nlight_zero_deg = {}\n\
          sensor_zero_deg = {}\nstray_per_sr = {}\ngain_error = {}\nnonlinearity = {}\n",
         1000 + seed,
         0.002 * normal(),

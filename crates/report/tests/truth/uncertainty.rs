@@ -8,11 +8,11 @@ use pdv::metric::quantile;
 use report::{Measurement, ModelUncertainty, MonteCarlo, Sweeps, measurements};
 use sweep::{Job, Sweep};
 
-use crate::bench::Laboratory;
+use crate::bench::{FINE_SERVOS, Laboratory};
 
 const THREE_PLANES: &str = include_str!("../../../../config/jobs/three-planes.toml");
 /// Arms that pass each other, so that nothing hides the peaks at small angles.
-const CAN_PASS: &str = "[envelope]\ncan_pass = true\n[uncertainty]\nplay_deg = 0.02\n";
+const CAN_PASS: &str = "[envelope]\ncan_pass = true\n[uncertainty]\nplay_deg = 0.02\n[sim]\n";
 
 /// A capture of the three planes with its readings that count.
 struct Captured {
@@ -72,7 +72,9 @@ impl Captured {
 #[tokio::test(start_paused = true)]
 async fn the_table_of_uncertainties_is_of_use_and_holds_the_truth() {
     for (name, largest_median) in [("chrome", 1.0), ("gold-paint", 0.4), ("blue-rubber", 0.3)] {
-        let entries = Captured::new("", name).await.entries();
+        let entries = Captured::new(&format!("[sim]\n{FINE_SERVOS}"), name)
+            .await
+            .entries();
         let stated: Vec<_> = entries.iter().filter(|[_, u, _]| *u >= 0.0).collect();
         for [f, u, _] in &stated {
             assert!(
@@ -99,7 +101,7 @@ async fn the_table_of_uncertainties_is_of_use_and_holds_the_truth() {
 #[tokio::test(start_paused = true)]
 async fn what_the_apertures_take_from_a_sharp_peak_is_within_what_is_stated() {
     for name in ["nickel", "chrome", "chrome-steel", "brass"] {
-        let captured = Captured::new(CAN_PASS, name).await;
+        let captured = Captured::new(&format!("{CAN_PASS}{FINE_SERVOS}"), name).await;
         let peaks = captured
             .counting()
             .filter(|(m, ..)| m.deviation.abs() < 1e-3 && m.theta_r < 1.3);
@@ -127,7 +129,7 @@ async fn what_the_apertures_take_from_a_sharp_peak_is_within_what_is_stated() {
 #[tokio::test(start_paused = true)]
 async fn no_reading_that_sees_light_is_stated_to_many_times_itself() {
     for name in ["chrome", "steel", "mirror:0.9", "black-obsidian", "gold-paint"] {
-        let captured = Captured::new(CAN_PASS, name).await;
+        let captured = Captured::new(&format!("{CAN_PASS}{FINE_SERVOS}"), name).await;
         let brightest = captured
             .counting()
             .fold(DVec3::ZERO, |most, (_, f, _)| most.max(f));
