@@ -40,6 +40,8 @@ pub enum State {
     Suspended,
     /// Lamp off, arms stopped and disengaged.
     ShuttingDown,
+    /// The run is done and recorded, and the arms go to where they are parked.
+    Parking,
 }
 
 /// What happens in a capture, for whoever watches it.

@@ -20,7 +20,7 @@ mod step;
 mod suspend;
 mod wait;
 
-pub(crate) use shutdown::Interrupt;
+pub(crate) use shutdown::{Interrupt, chain};
 pub(crate) use step::MAX_EXPOSURES;
 
 /// Ticks of the photometer's clock per second.

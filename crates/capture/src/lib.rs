@@ -14,6 +14,7 @@ mod flight;
 mod journal;
 mod mechanics;
 mod memory_journal;
+mod park;
 mod progress;
 mod reading;
 mod run;

@@ -7,6 +7,7 @@ use rig::{Drive, Fault, Rig};
 use tokio::sync::watch;
 
 use crate::execution::{Execution, Interrupt};
+use crate::park::park;
 use crate::{CaptureError, Command, Event, Extension, Journal, Outcome, Record, State, extended_plan};
 
 /// Says what else is to be measured, from the records so far, once every step of the plan is done. It may take its
@@ -25,7 +26,8 @@ pub type Thinking = Pin<Box<dyn Future<Output = Extension> + Send>>;
 /// in hand, a [`Command::Stop`] and a [`Command::Estop`] at once, each in its way.
 ///
 /// On every way out, also when `on_event` panics, the lamp goes off, the arms stop and the watchdogs are disarmed,
-/// and the journal says how it ended. Only a future that is dropped half-way cannot do that: then the bus falls
+/// and the journal says how it ended. After a run that is done, and no other, the arms then go to where they are parked, if the
+/// rig file says so; anything that is asked for meanwhile stops them. Only a future that is dropped half-way cannot do that: then the bus falls
 /// silent and the watchdogs of the devices stop the arms and put the lamp out, after the rig file's `watchdog_ms`.
 ///
 /// A fault of the rig is an [`Outcome::Failed`], no error: the journal is sound and the run can be resumed.
@@ -75,6 +77,7 @@ async fn begin<R: Rig>(
     };
     let file = drive.file().clone();
     let ask = ask.map(|ask| ask as &mut Ask<'_>);
+    let parking = control.clone();
     let mut execution = Execution::new(plan, &file, drive, journal, control.clone(), on_event, ask);
     let result = guarded(async {
         let result = tokio::select! {
@@ -87,7 +90,13 @@ async fn begin<R: Rig>(
     })
     .await;
     match result {
-        Ok(result) => execution.finish(result).await,
+        Ok(result) => {
+            let outcome = execution.finish(result).await?;
+            if outcome == Outcome::Done && file.motion.park_between {
+                park(drive, parking, on_event).await;
+            }
+            Ok(outcome)
+        }
         Err(panic) => {
             execution.abandon().await;
             resume_unwind(panic)

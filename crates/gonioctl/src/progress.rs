@@ -87,6 +87,7 @@ fn word(state: State) -> &'static str {
         State::Paused => "paused",
         State::Suspended => "suspended",
         State::ShuttingDown => "shut down",
+        State::Parking => "park",
     }
 }
 

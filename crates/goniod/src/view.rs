@@ -34,6 +34,7 @@ pub(crate) fn activity(state: capture::State) -> Activity {
         capture::State::Paused => Activity::Paused,
         capture::State::Suspended => Activity::Suspended,
         capture::State::ShuttingDown => Activity::ShuttingDown,
+        capture::State::Parking => Activity::Moving,
     }
 }
 

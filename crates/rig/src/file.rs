@@ -226,6 +226,8 @@ pub struct MotionSettings {
     pub estop: Estop,
     /// Where the arms rest.
     pub park: Pose,
+    /// Whether they go there after each run that is done.
+    pub park_between: bool,
 }
 
 /// Direction of the last approach to a pose.

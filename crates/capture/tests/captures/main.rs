@@ -7,6 +7,7 @@ mod fly;
 mod journal;
 mod light;
 mod operator;
+mod parking;
 mod servos;
 mod suspend;
 mod time;

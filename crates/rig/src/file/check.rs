@@ -273,6 +273,7 @@ fn motion(source: &Source<'_>, raw: &RawMotion, envelope: &Envelope) -> Result<M
         watchdog: Duration::from_millis(watchdog as u64),
         estop: source.one_of("motion.estop", &raw.estop, &estops)?,
         park,
+        park_between: raw.park_between,
     })
 }
 

@@ -70,6 +70,7 @@ pub(super) struct RawMotion {
     pub(super) overshoot_deg: Spanned<f64>,
     pub(super) watchdog_ms: Spanned<i64>,
     pub(super) estop: Spanned<String>,
+    pub(super) park_between: bool,
     pub(super) park_light_deg: Spanned<f64>,
     pub(super) park_sensor_deg: Spanned<f64>,
 }
