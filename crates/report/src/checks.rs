@@ -29,6 +29,8 @@ const REPEAT_LIMIT: f64 = 0.03;
 /// much, before what was measured until then cannot be believed: 6 standard deviations.
 const RESUMED_SIGMAS: f64 = 3.0;
 const RESUMED_LEAST: f64 = 0.01;
+/// No dark level of a sound photometer changes what is bright enough to be compared by more than this.
+const RESUMED_MOST_BY_DARK: f64 = 0.25;
 /// Counts of the lamp monitor from which it tells something.
 const MONITORED: u32 = 100;
 /// The two sides of a lobe may differ by so much: beyond it the assumption of the model costs more than the rig does.
@@ -43,8 +45,11 @@ pub(crate) fn resumed(measurements: &[Measurement], records: &[Record]) -> Optio
             .iter()
             .filter(|m| m.reading.step == again.step && m.reading.accepted);
         before
-            .filter_map(|m| Some((m, m.u? / m.rgb()?.abs())))
-            .any(|(m, u)| {
+            .filter_map(|m| {
+                let rgb = m.rgb()?.abs();
+                Some((m, m.u? / rgb, m.u_but_for_dark()? / rgb))
+            })
+            .any(|(m, u, u_but_for_dark)| {
                 // Where nothing is on the monitor's port it tells nothing of the lamp.
                 let monitored = again.counts.monitor.min(m.reading.counts.monitor) >= MONITORED;
                 let level = |reading: &Reading, c: usize| {
@@ -53,7 +58,9 @@ pub(crate) fn resumed(measurements: &[Measurement], records: &[Record]) -> Optio
                 };
                 (0..3).any(|c| {
                     let difference = level(again, c) / level(&m.reading, c).max(f64::MIN_POSITIVE) - 1.0;
-                    difference.abs() > (RESUMED_SIGMAS * u[c]).max(RESUMED_LEAST)
+                    let allowed = (RESUMED_SIGMAS * u[c]).max(RESUMED_LEAST);
+                    let by_dark = (RESUMED_SIGMAS * u_but_for_dark[c]).max(RESUMED_MOST_BY_DARK);
+                    difference.abs() > allowed.min(by_dark)
                 })
             })
     };

@@ -64,6 +64,13 @@ impl Measurement {
         Some(COVERAGE * squares.into_iter().sum::<DVec3>().map(f64::sqrt))
     }
 
+    /// Expanded uncertainty, k = 2, sr⁻¹, but for the dark level: of two levels that disagree a reading is as uncertain as they
+    /// are apart, so that neither is ever out of it.
+    pub(crate) fn u_but_for_dark(&self) -> Option<DVec3> {
+        let (u, dark) = (self.u?, COVERAGE * DVec3::from_array(self.budget?.dark));
+        Some((u * u - dark * dark).max(DVec3::ZERO).map(f64::sqrt))
+    }
+
     /// Reflectance, where there is one.
     pub fn rgb(&self) -> Option<DVec3> {
         self.reflectance.and_then(Result::ok)

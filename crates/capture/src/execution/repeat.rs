@@ -4,12 +4,13 @@ use sweep::Sweep;
 use super::{Execution, Interrupt, readings};
 use crate::{Event, Flag, Reading, Record};
 
-/// So many of the latest readings are measured again: light from outside that flickers is missed by a short exposure now and
-/// then, and so it is by a choice of the faintest ones.
-const LATEST: usize = 8;
+/// So many of the latest readings are measured again, and so many of the faintest since the room was last seen to be dark:
+/// light from outside that flickers is missed by a short exposure now and then, and where a lobe is bright it does not show.
+const LATEST: usize = 6;
+const FAINTEST: usize = 4;
 
 impl<R: Rig> Execution<'_, R> {
-    /// Measures the last poses of the finished part again, the latest first, and records by how much they differ.
+    /// Measures poses of the finished part again, the latest first, and records by how much they differ.
     pub(super) async fn repeat(&mut self) -> Result<(), Interrupt<R::Error>> {
         let references: Vec<Reading> = references(self.journal.records()).cloned().collect();
         if !references.is_empty() {
@@ -64,8 +65,29 @@ fn references(records: &[Record]) -> impl Iterator<Item = &Reading> {
         let poor = [Flag::Saturated, Flag::Dim];
         reading.accepted && reading.lamp && !reading.flags.iter().any(|flag| poor.contains(flag))
     };
-    let sound: Vec<&Reading> = readings(records).filter(sound).collect();
-    sound.into_iter().rev().take(LATEST)
+    let mut latest: Vec<&Reading> = readings(before(records)).filter(sound).collect();
+    latest.reverse();
+    let dark = readings(before(records)).filter(|reading| reading.accepted && !reading.lamp);
+    let dark_ticks = dark.map(|reading| reading.device_ticks).max().unwrap_or_default();
+    let mut others = latest.split_off(LATEST.min(latest.len()));
+    others.retain(|reading| reading.device_ticks > dark_ticks);
+    others.sort_by(|a, b| faintest(a).total_cmp(&faintest(b)));
+    latest.into_iter().chain(others.into_iter().take(FAINTEST))
+}
+
+/// The records of before this execution, which has begun.
+fn before(records: &[Record]) -> &[Record] {
+    let begun = records
+        .iter()
+        .rposition(|record| matches!(record, Record::Begin { .. }));
+    &records[..begun.unwrap_or(records.len())]
+}
+
+/// What the faintest channel sees: counts per µs at gain ×1.
+fn faintest(reading: &Reading) -> f64 {
+    let exposure = reading.counts.exposure;
+    let least = reading.counts.rgb.into_iter().min().unwrap_or_default();
+    f64::from(least) / (f64::from(exposure.integration_us) * exposure.gain.factor())
 }
 
 /// Relative difference of the channel that was brightest, each relative to the lamp monitor.

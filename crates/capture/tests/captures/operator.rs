@@ -443,7 +443,7 @@ async fn a_resumed_run_tells_by_how_much_the_last_poses_differ_now() {
         }
     });
     assert_eq!(outcome.await.unwrap(), Outcome::Done);
-    assert!((1..=8).contains(&told.len()), "{told:?}");
+    assert!((1..=10).contains(&told.len()), "{told:?}");
     let accepted = scene.journal.accepted();
     for &(step, sweep, difference_rel) in &told {
         assert_eq!((sweep, difference_rel), (sweep::Sweep::Repeat, 0.0));

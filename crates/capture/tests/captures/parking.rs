@@ -52,7 +52,7 @@ async fn after_a_stop_a_finish_or_an_emergency_stop_nothing_parks() {
         let (mut readings, mut parking) = (0, false);
         let outcome = scene.run(|event| {
             readings += usize::from(matches!(event, Event::Reading { .. }));
-            if readings == 20 {
+            if readings == 32 {
                 control.send_replace(command);
             }
             parking |= event == PARKING;

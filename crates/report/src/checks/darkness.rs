@@ -137,9 +137,11 @@ fn differences(counts: &Counts, first: &Taken, darks: &Darks, rig: &RigFile) -> 
     }))
 }
 
-/// Whether a change is more than the expanded uncertainty of a reflectance.
+/// Whether a change is more than the expanded uncertainty that a reflectance has without it.
 fn exceeds(change: &Change, m: &Measurement, records: &[Record], rig: &RigFile) -> bool {
-    let Some(u) = m.u else { return false };
+    let Some(u) = m.u_but_for_dark() else {
+        return false;
+    };
     let white = certificate(records).and_then(|certificate| certificate.white.as_ref());
     let responsivity = white.map_or(rig.calibration.responsivity, |white| white.responsivity);
     let cosine = rig.calibration.filling.arm(m.pose).rad().cos();
