@@ -328,10 +328,10 @@ impl Actuator for Servo {
 
     async fn stop(&mut self) -> Result<(), RigError> {
         let torque = self.node.ask(Block::of(servo::TORQUE_ENABLE)).await?;
-        if torque.parameters[0] == 1 {
-            if let Some(goal) = self.stopping_goal().await? {
-                self.node.tell(servo::GOAL_POSITION, &goal.to_le_bytes()).await?;
-            }
+        if torque.parameters[0] == 1
+            && let Some(goal) = self.stopping_goal().await?
+        {
+            self.node.tell(servo::GOAL_POSITION, &goal.to_le_bytes()).await?;
         }
         Ok(())
     }
