@@ -20,6 +20,8 @@ use crate::{Clock, Device, Fault, Mechanics, Mishap, Settings, SimError, baud, p
 
 /// Stream of random numbers for what is drawn once; readings use the streams 0, 1, …
 const ONCE: u64 = u64::MAX;
+/// Stream of an instrument's first reading; the node never takes as many.
+const INSTRUMENT: u64 = 1 << 48;
 /// Longest stretch of a quadrature while an arm moves, s: 0.06° at 60°/s, well below an aperture.
 const PANEL_S: f64 = 1e-3;
 /// The same where arms only tremble, at 50 Hz at most.
@@ -47,6 +49,10 @@ pub struct Bench {
     photodiodes: Photodiodes,
     optics: Optics,
     mishaps: Mishaps,
+    /// Since when an instrument beside the photometer integrates.
+    measuring: Option<Duration>,
+    /// Readings that it took.
+    measured: u64,
 }
 
 impl Bench {
@@ -99,6 +105,8 @@ impl Bench {
                 [amounts.source_aperture_deg, amounts.detector_aperture_deg].map(f64::to_radians),
             ),
             mishaps: Mishaps::new(settings.mishaps.clone(), settings.seed, Duration::ZERO)?,
+            measuring: None,
+            measured: 0,
         };
         bench.set_clock(settings.clock);
         for fault in settings.faults {
@@ -139,7 +147,11 @@ impl Bench {
         }
         self.pass(t);
         let start = self.photometer.integration().map(|running| running.start);
-        let needed_s = start.unwrap_or(self.now).min(self.now).as_secs_f64();
+        let needed_s = [start, self.measuring]
+            .into_iter()
+            .flatten()
+            .fold(self.now, Duration::min)
+            .as_secs_f64();
         self.photometer.forget(needed_s);
         for servo in &mut self.servos {
             servo.forget(needed_s);
@@ -255,22 +267,45 @@ impl Bench {
         }
     }
 
+    /// An instrument that looks at the same light begins to integrate now.
+    pub fn begin_measuring(&mut self) {
+        self.measuring = Some(self.now);
+    }
+
+    /// What it has integrated since, until a time that has passed: counts of the green photodiode at gain ×1, not whole
+    /// ones, and without the node's converter and its offset. `None` where it did not begin.
+    pub fn end_measuring(&mut self, duration: Duration) -> Option<f64> {
+        let from = self.measuring.take()?;
+        let (from_s, to_s) = (from.as_secs_f64(), (from + duration).min(self.now).as_secs_f64());
+        if to_s <= from_s {
+            return Some(0.0);
+        }
+        let light = self.light(from_s, to_s, 1.0);
+        self.measured += 1;
+        Some(self.photodiodes.photocurrent(light, INSTRUMENT + self.measured))
+    }
+
     fn expose(&self, integration: Integration) -> Exposed {
         let (from_s, to_s) = (integration.start.as_secs_f64(), integration.end.as_secs_f64());
-        let light = Light {
-            signal: self.collect(from_s, to_s),
-            lamp_s: self.photometer.lamp().integral(from_s, to_s),
-            room_s: self.photometer.room().integral(from_s, to_s),
-            duration_s: to_s - from_s,
-            gain: rig::Gain::ALL[usize::from(integration.gain_step)].factor(),
-            temperature_c: self.photometer.temperature_c((from_s + to_s) / 2.0),
-        };
+        let gain = rig::Gain::ALL[usize::from(integration.gain_step)].factor();
+        let light = self.light(from_s, to_s, gain);
         let mut exposed = self.photodiodes.expose(light, integration.serial);
         if self.photometer.glares() {
             exposed.rgb = [self.photodiodes.full_scale; 3];
             exposed.saturated = true;
         }
         exposed
+    }
+
+    fn light(&self, from_s: f64, to_s: f64, gain: f64) -> Light {
+        Light {
+            signal: self.collect(from_s, to_s),
+            lamp_s: self.photometer.lamp().integral(from_s, to_s),
+            room_s: self.photometer.room().integral(from_s, to_s),
+            duration_s: to_s - from_s,
+            gain,
+            temperature_c: self.photometer.temperature_c((from_s + to_s) / 2.0),
+        }
     }
 
     /// ∫ lamp · f · cos dt, s/sr: exact while the arms rest, by quadrature between the breaks of their motion

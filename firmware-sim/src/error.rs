@@ -50,6 +50,14 @@ pub enum SimError {
         /// Why it failed.
         source: std::io::Error,
     },
+    /// The simulated instrument cannot be served.
+    #[error("cannot serve the simulated instrument at {address}")]
+    Instrument {
+        /// Where it was to listen.
+        address: String,
+        /// Why it failed.
+        source: std::io::Error,
+    },
     /// The stable link to the pseudo-terminal cannot be made.
     #[error("cannot make the link {}", .path.display())]
     Link {

@@ -102,6 +102,24 @@ impl Photodiodes {
         }
     }
 
+    /// Counts of the green photodiode alone at gain ×1, as an instrument sees its current: with shot noise, dark current and
+    /// stray light, without converter and offset.
+    pub(crate) fn photocurrent(&self, light: Light, serial: u64) -> f64 {
+        let amounts = self.imperfections;
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        random.set_stream(serial);
+        let warmer = match amounts.dark_doubling_c {
+            0.0 => 0.0,
+            doubling => (light.temperature_c - DARK_REFERENCE_C) / doubling,
+        };
+        let dark = amounts.dark_counts_per_s * warmer.exp2() * light.duration_s;
+        let lit = self.calibration.responsivity[1]
+            * (1.0 + amounts.responsivity_error)
+            * 1e6
+            * (light.signal.y + amounts.stray_per_sr * light.lamp_s + light.room_s);
+        shot(lit + dark, amounts.shot_noise_electrons, &mut random)
+    }
+
     fn convert(&self, counts: f64, random: &mut ChaCha8Rng) -> u32 {
         let normal: f64 = StandardNormal.sample(random);
         let read = counts + self.imperfections.read_noise_counts * normal;

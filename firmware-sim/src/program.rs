@@ -31,6 +31,10 @@ struct Arguments {
     /// Let time go by the bytes on the wire instead of the clock on the wall.
     #[arg(long)]
     wire_time: bool,
+    /// Serve a picoammeter that looks at the same light too, at a TCP address such as 127.0.0.1:5025: it speaks the commands of a
+    /// Keithley 6485.
+    #[arg(long, value_name = "ADDRESS")]
+    scpi: Option<String>,
     /// Take orders from stdin while it runs, a line of TOML each, such as "wire.drop_reply = 0.1", "mishaps.reboot = 60",
     /// "fault = { device = 'sensor', what = 'overload' }", "plugged = false". docs/simulator.md has them all.
     #[arg(long)]
@@ -94,6 +98,12 @@ fn run(arguments: Arguments) -> Result<(), Box<dyn Error>> {
         if let Some(path) = &arguments.trace {
             trace::keep(path, &server)?;
         }
+        let instrument = arguments
+            .scpi
+            .as_deref()
+            .map(|address| server.instrument(&rig, address));
+        // Served until the end.
+        let _instrument = instrument.transpose()?;
         terminal::line(server.path().display())?;
         tracing::info!(wire_time = arguments.wire_time, "serving");
         let mut orders = if arguments.orders {

@@ -32,6 +32,7 @@ pub fn mechanics(rig: &RigFile, start: Option<Pose>) -> Mechanics {
         // And one for the faintest channel.
         exposures: MAX_EXPOSURES + 1,
         transaction_s: transaction_s(rig),
+        in_flight: rig.detector.abilities().in_flight,
         flight_s: flight_s(rig),
         warm_up_s: rig.photometer.lamp_warm_up.as_secs_f64(),
         dark_every_s: rig.visits.dark_every.as_secs_f64(),

@@ -25,7 +25,9 @@ pub(crate) fn doctor(
     let (file, name) = session::rig_file(rig)?;
     let port = RigPort::new(&file, &name.display().to_string())?;
     let mut findings = Findings::new(as_json);
-    examine(port.path(), &file, out, &mut |finding| findings.tell(finding))?;
+    examine(port.path(), port.file(&file), out, &mut |finding| {
+        findings.tell(finding)
+    })?;
     findings.end(&name, junit)
 }
 
@@ -79,7 +81,8 @@ async fn ask(
         tell(finding);
     }
     let photometer = answering.contains(&Device::Photometer);
-    if photometer {
+    // One elsewhere tells nothing of the bus.
+    if photometer && drive.file().detector.on_bus() {
         tell(doctor::round_trip(drive, timer).await);
     }
     if answering.len() == ALL {

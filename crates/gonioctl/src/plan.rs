@@ -30,6 +30,9 @@ pub(crate) fn plan(job: &Path, rig: Option<&Path>, as_json: bool) -> anyhow::Res
         return Ok(());
     }
     list(&plan, order.light(&plan))?;
+    for limit in order.rig.detector.abilities().limits() {
+        terminal::line(format_args!("detector   {limit}"))?;
+    }
     if let Some(until) = order.job.until {
         terminal::line(then(until))?;
     }

@@ -20,6 +20,7 @@ pub use braking::Braking;
 pub use census::{Census, Heard};
 pub use model::{Indirect, MODELS, Model, Series};
 pub use photometer::Photometer;
+pub(crate) use port::open as open_port;
 pub use port::{Adapter, Usb, ports};
 pub use register::{BAUD_RATES, PHOTOMETER_MODEL};
 pub use rig::Dynamixel;

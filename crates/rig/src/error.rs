@@ -171,6 +171,16 @@ pub enum RigError {
         /// Each difference, and how to mend it.
         differences: Vec<String>,
     },
+    /// An instrument in the place of the photometer is silent, or answers what it should not.
+    #[error("the detector at {address}: {what}")]
+    Instrument {
+        /// Where it is.
+        address: String,
+        /// Whether it answered, so that asking again will not help.
+        answered: bool,
+        /// What is wrong, and what to do about it.
+        what: String,
+    },
     /// An arm was to move that was not engaged.
     #[error("{device} is not engaged, it must not move")]
     NotEngaged {
@@ -226,7 +236,10 @@ impl Fault for RigError {
             | Self::PortUnusable { .. }
             | Self::Thread { .. } => FaultKind::Setup,
             Self::PortGone { .. } => FaultKind::Disconnected,
-            Self::NoReply { .. } | Self::BadReply { .. } => FaultKind::NoReply,
+            Self::NoReply { .. } | Self::BadReply { .. } | Self::Instrument { answered: false, .. } => {
+                FaultKind::NoReply
+            }
+            Self::Instrument { answered: true, .. } => FaultKind::Refused,
             Self::Refused { .. } | Self::NotEngaged { .. } => FaultKind::Refused,
             Self::Hardware { .. } => FaultKind::Hardware,
             Self::Mismatch { .. } => FaultKind::Mismatch,
@@ -243,6 +256,7 @@ impl Fault for RigError {
             | Self::Mismatch { device, .. }
             | Self::NotEngaged { device }
             | Self::Moved { device, .. } => Some(*device),
+            Self::Instrument { .. } => Some(Device::Photometer),
             _ => None,
         }
     }

@@ -7,11 +7,15 @@ use crate::dynamixel::Model;
 use crate::{Axis, Calibration, Lamp, RigError};
 
 mod check;
+mod detector;
 mod raw;
 mod source;
 
 #[cfg(test)]
 mod tests;
+
+pub(crate) use detector::CONNECTION;
+pub use detector::{Abilities, DetectorKind, DetectorSettings, LampControl};
 
 /// The rig file, checked: what the rig is and where it may move.
 ///
@@ -28,7 +32,9 @@ pub struct RigFile {
     pub envelope: Envelope,
     /// How arms move and settle.
     pub motion: MotionSettings,
-    /// The photometer.
+    /// What counts the light.
+    pub detector: DetectorSettings,
+    /// Its exposures.
     pub photometer: PhotometerSettings,
     /// From counts to reflectance.
     pub calibration: Calibration,
@@ -272,6 +278,9 @@ pub struct PhotometerSettings {
 }
 
 impl RigFile {
+    /// Address of the detector, and name of the port, of the built-in simulator.
+    pub const SIMULATED: &str = "sim";
+
     /// Text of the built-in rig file, the shipped config/rig.toml.
     pub const BUILT_IN: &str = include_str!("../../../config/rig.toml");
 

@@ -10,6 +10,7 @@ pub mod conform;
 mod detector;
 pub mod doctor;
 mod drive;
+pub mod drivers;
 pub mod dynamixel;
 mod error;
 mod fault;
@@ -31,8 +32,8 @@ pub use dynamixel::{Adapter, Dynamixel, Usb, ports};
 pub use error::{Place, RigError};
 pub use fault::{Device, Fault, FaultKind};
 pub use file::{
-    About, Approach, ArmSettings, Band, BusSettings, Certificates, Estop, MotionSettings, PhotometerSettings,
-    Port, RigFile, Suspend, Uncertainties, Visits,
+    Abilities, About, Approach, ArmSettings, Band, BusSettings, Certificates, DetectorKind, DetectorSettings,
+    Estop, LampControl, MotionSettings, PhotometerSettings, Port, RigFile, Suspend, Uncertainties, Visits,
 };
 pub use rig::{Observation, Rig, Snapshot};
 pub use surroundings::Surroundings;

@@ -44,7 +44,7 @@ impl OpenRig {
     /// A `[sim]` table or a specimen that is not allowed; a port that is missing, in use or not permitted.
     pub fn open(file: &RigFile, name: &str) -> Result<Self, SessionError> {
         let port = RigPort::new(file, name)?;
-        let rig = Dynamixel::open(port.path(), file).map_err(|source| SessionError::Port {
+        let rig = Dynamixel::open(port.path(), port.file(file)).map_err(|source| SessionError::Port {
             file: name.to_owned(),
             source: Box::new(source),
         })?;

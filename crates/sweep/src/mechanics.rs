@@ -31,6 +31,9 @@ pub struct Mechanics {
     pub exposures: u32,
     /// Expected time on the bus and on the host for each reading, s.
     pub transaction_s: f64,
+    /// Whether the detector can be read while the arms move.
+    #[serde(default = "can")]
+    pub in_flight: bool,
     /// Expected seconds of one reading in flight: its light, and what the bus needs between two.
     pub flight_s: f64,
     /// Lamp warm-up, s.
@@ -42,6 +45,11 @@ pub struct Mechanics {
     pub reference: Option<(Pose, f64)>,
     /// Where the arms stand before the run; `None`: not known yet, then the plan's first leg is not timed or checked.
     pub start: Option<Pose>,
+}
+
+/// Every detector could be read in flight of which an older version wrote.
+fn can() -> bool {
+    true
 }
 
 impl Mechanics {

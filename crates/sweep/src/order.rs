@@ -150,6 +150,7 @@ mod tests {
             integration_us: [100, 1000],
             exposures: 9,
             transaction_s: 0.0,
+            in_flight: true,
             flight_s: 0.0,
             warm_up_s: 0.0,
             dark_every_s: 0.0,

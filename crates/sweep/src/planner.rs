@@ -132,8 +132,12 @@ fn lay(
 
 /// Whether a sweep can be flown. What it leaves out says where not, and else what flying costs.
 pub(crate) fn may_fly(mechanics: &Mechanics, sweep: &mut Targets) -> bool {
-    let may = pass(mechanics, &sweep.poses).is_some();
+    let may = mechanics.in_flight && pass(mechanics, &sweep.poses).is_some();
     let (what, why) = match may {
+        false if !mechanics.in_flight => (
+            "in flight",
+            "the detector cannot be read while the arms move: they stop for each reading",
+        ),
         true => (
             "a second exposure for faint colours",
             "in flight each reading has one, for its brightest colour",

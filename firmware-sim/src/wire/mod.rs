@@ -25,5 +25,6 @@ pub use counters::Counters;
 pub use faults::WireFaults;
 pub use line::{Line, Outgoing};
 pub use server::Server;
+pub(crate) use server::Shared;
 pub use settings::WireSettings;
 pub use written::Written;

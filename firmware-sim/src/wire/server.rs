@@ -14,7 +14,7 @@ use super::line::{Line, Outgoing};
 use super::link::Link;
 use super::terminal::Terminal;
 use super::{Counters, WireFaults, WireSettings, Written};
-use crate::{Bench, SimError};
+use crate::{Bench, Instrument, SimError};
 
 /// Longest time until the mark of a killed client is cleared.
 const HOUSEKEEPING: Duration = Duration::from_millis(100);
@@ -30,15 +30,21 @@ pub struct Server {
     cable: Option<Cable>,
 }
 
-struct Shared {
+pub(crate) struct Shared {
     line: Mutex<Line>,
     opened: Instant,
 }
 
 impl Shared {
     /// A test that panics while it holds the line does not take the simulator down.
-    fn line(&self) -> MutexGuard<'_, Line> {
+    pub(crate) fn line(&self) -> MutexGuard<'_, Line> {
         self.line.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The bench, its time being now.
+    pub(crate) fn bench<R>(&self, look: impl FnOnce(&mut Bench) -> R) -> R {
+        let now = self.opened.elapsed();
+        look(self.line().bench(now))
     }
 }
 
@@ -143,10 +149,17 @@ impl Server {
         &self.path
     }
 
+    /// Serves an instrument that looks at the same light, on a TCP port, until what is returned is dropped.
+    ///
+    /// # Errors
+    /// [`SimError::Instrument`].
+    pub fn instrument(&self, rig: &RigFile, address: &str) -> Result<Instrument, SimError> {
+        Instrument::serve(Arc::clone(&self.shared), rig, address)
+    }
+
     /// Looks at the bench, or meddles with it, between two packets; its time is now.
     pub fn bench<R>(&self, look: impl FnOnce(&mut Bench) -> R) -> R {
-        let now = self.shared.opened.elapsed();
-        look(self.shared.line().bench(now))
+        self.shared.bench(look)
     }
 
     /// Changes what goes wrong on the wire from now on.

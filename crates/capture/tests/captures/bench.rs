@@ -114,6 +114,7 @@ impl Scene {
         // This rig has no wire.
         let mechanics = Mechanics {
             transaction_s: 0.0,
+            in_flight: true,
             flight_s: 0.006,
             ..mechanics(&file, Some(start))
         };

@@ -74,6 +74,12 @@ pub async fn device<R: Rig>(drive: &mut Drive<R>, device: Device) -> Finding {
         Device::Photometer => "photometer",
     };
     match drive.identify(device).await {
+        Ok(identity) if device == Device::Photometer && !drive.file().detector.on_bus() => {
+            let detector = &drive.file().detector;
+            let text = format!("{} at {}", identity.model, detector.address);
+            let limits = detector.abilities().limits();
+            Finding::ok(check, format!("{text}; {}", limits.join("; ")))
+        }
         Ok(identity) => {
             let checked = match device {
                 Device::Photometer => "",

@@ -1,6 +1,6 @@
 use super::Finding;
 use super::suspend::held;
-use crate::{Counts, Drive, DriveError, Exposure, Gain, Lamp, PhotometerSettings, Rig};
+use crate::{Counts, Drive, DriveError, Exposure, Gain, Lamp, LampControl, PhotometerSettings, Rig};
 
 /// Longest integration that is tried, µs.
 const INTEGRATION_US: u32 = 10_000;
@@ -53,6 +53,11 @@ async fn attempt<R: Rig>(
     drive.lamp(true).await?;
     drive.wait(settings.lamp_warm_up).await?;
     let lit = drive.expose(exposure).await?;
+    let abilities = drive.file().detector.abilities();
+    if !abilities.monitor {
+        findings.push(unmonitored(&unlit, &lit, abilities.lamp));
+        return Ok(());
+    }
     let output = (f64::from(lit.monitor) - f64::from(unlit.monitor)) / (monitor * f64::from(lit_us));
     let followed = drive.file().visits.lamp == Lamp::Monitor;
     let bounds = drive.file().suspend.lamp_rel.filter(|_| followed);
@@ -66,6 +71,24 @@ async fn attempt<R: Rig>(
     findings.push(lamp(output, lit.temperature_c));
     findings.extend(held);
     Ok(())
+}
+
+/// What is seen of a lamp that no monitor looks at: what the detector counts where the arms stand.
+fn unmonitored(unlit: &Counts, lit: &Counts, lamp: LampControl) -> Finding {
+    const CHECK: &str = "lamp";
+    let text = format!(
+        "no monitor tells its output; where the arms stand, {} counts with it and {} without",
+        lit.rgb[0], unlit.rgb[0]
+    );
+    match lamp {
+        LampControl::Always => Finding::warn(
+            CHECK,
+            format!("{text}: nothing switches it"),
+            "no stop, fault or end of a run puts this lamp out: make sure that it may stay on, or let something switch it \
+             (detector.lamp)",
+        ),
+        LampControl::Node | LampControl::Scpi => Finding::ok(CHECK, text),
+    }
 }
 
 /// Judges dark readings, one at each gain.

@@ -63,7 +63,7 @@ impl<R: Rig> Drive<R> {
                     return Err(wrong(format!("it was taken with {:?}", counts.exposure)));
                 }
                 Some(counts) => return Ok((counts, looks.all())),
-                None if self.waited - waited > exposure.duration() + self.file.motion.timeout => {
+                None if self.waited - waited > exposure.duration() + self.patience(exposure) => {
                     return Err(wrong("still integrating".to_owned()));
                 }
                 None => left = exposure.duration().saturating_sub(passed),
@@ -96,6 +96,15 @@ impl<R: Rig> Drive<R> {
             }
         }
         Ok(expected)
+    }
+
+    /// For how long a reading may be late: an instrument elsewhere ends its own by its own time limits.
+    fn patience(&self, exposure: Exposure) -> Duration {
+        let detector = &self.file.detector;
+        match detector.on_bus() {
+            true => self.file.motion.timeout,
+            false => self.file.motion.timeout + detector.longest(exposure.duration()),
+        }
     }
 
     async fn sequence(&mut self) -> Result<u32, DriveError<R::Error>> {

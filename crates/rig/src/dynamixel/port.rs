@@ -88,7 +88,7 @@ fn readable(folder: &Path) -> Result<(), RigError> {
 }
 
 /// Opens a port in raw mode at a baud rate and locks it (TIOCEXCL and flock) until the value is dropped.
-pub(super) fn open(path: &Path, baud: u32) -> Result<TTYPort, RigError> {
+pub(crate) fn open(path: &Path, baud: u32) -> Result<TTYPort, RigError> {
     serialport::new(path.to_string_lossy(), baud)
         .open_native()
         .map_err(|source| refusal(path, source))

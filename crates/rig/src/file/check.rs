@@ -4,6 +4,7 @@ use std::time::Duration;
 use arms::{Arm, ArmAngle, Envelope, Limits, Pose, Profile};
 use toml::Spanned;
 
+use super::detector::detector;
 use super::raw::{RawAbout, RawArm, RawBus, RawMotion, RawPhotometer};
 use super::source::Source;
 use super::{
@@ -42,6 +43,13 @@ pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
     let margin_rad = uncertainty.shadow_margin_rad();
     let visits = calibration::visits(source, &raw.calibration, &envelope, margin_rad)?;
     monitored(source, &raw.photometer, &photometer, &calibration, &visits)?;
+    let detector = detector(
+        source,
+        &raw.detector,
+        (&raw.photometer, &photometer),
+        &visits,
+        &bus.port,
+    )?;
     for (key, id, others) in [
         ("sensor.id", &raw.sensor.id, vec![light.id]),
         ("photometer.id", &raw.photometer.id, vec![light.id, sensor.id]),
@@ -56,6 +64,7 @@ pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
         suspend: suspend::suspend(source, &raw.suspend, [light.model, sensor.model])?,
         arms: [light, sensor],
         motion: motion(source, &raw.motion, &envelope)?,
+        detector,
         photometer,
         calibration,
         visits,
@@ -89,7 +98,7 @@ fn about(source: &Source<'_>, raw: &RawAbout) -> Result<About, RigError> {
 }
 
 /// A duration in ms.
-fn millis(
+pub(super) fn millis(
     source: &Source<'_>,
     key: &str,
     value: &Spanned<f64>,

@@ -11,6 +11,7 @@ pub(super) struct RawFile {
     pub(super) sensor: RawArm,
     pub(super) envelope: RawEnvelope,
     pub(super) motion: RawMotion,
+    pub(super) detector: RawDetector,
     pub(super) photometer: RawPhotometer,
     pub(super) calibration: RawCalibration,
     pub(super) suspend: RawSuspend,
@@ -34,6 +35,25 @@ pub(super) struct RawBus {
     pub(super) latency_ms: Spanned<f64>,
     pub(super) echo: bool,
     pub(super) silence_ms: Spanned<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct RawDetector {
+    pub(super) kind: Spanned<String>,
+    pub(super) address: Spanned<String>,
+    pub(super) baud: Spanned<i64>,
+    pub(super) profile: Spanned<String>,
+    pub(super) full_reading: Spanned<f64>,
+    pub(super) line_hz: Spanned<f64>,
+    pub(super) timeout_ms: Spanned<f64>,
+    pub(super) settle_ms: Spanned<f64>,
+    pub(super) lamp: Spanned<String>,
+    pub(super) setup: Spanned<String>,
+    pub(super) configure: Spanned<String>,
+    pub(super) read: Spanned<String>,
+    pub(super) lamp_on: Spanned<String>,
+    pub(super) lamp_off: Spanned<String>,
 }
 
 #[derive(Deserialize)]

@@ -48,7 +48,19 @@ impl Source<'_> {
             .get("motion")
             .and_then(|motion| motion.get("approach"))
             .cloned();
+        // Certificates that were made with the node keep their fingerprint. Where an instrument is, is no part of what it is.
+        let mut detector = all.remove("detector");
+        let keys = detector.as_mut().and_then(toml::Value::as_table_mut);
+        let node = keys.is_none_or(|keys| {
+            for connection in ["address", "baud", "timeout_ms"] {
+                keys.remove(connection);
+            }
+            keys.get("kind").and_then(toml::Value::as_str) == Some("node")
+        });
         all.retain(|key, _| ["light", "sensor", "photometer", "calibration"].contains(&key));
+        if let Some(detector) = detector.filter(|_| !node) {
+            all.insert("detector".to_owned(), detector);
+        }
         if let Some(approach) = approach.filter(|approach| approach.as_str() != Some("none")) {
             all.insert("approach".to_owned(), approach);
         }

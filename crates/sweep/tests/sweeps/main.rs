@@ -41,6 +41,7 @@ fn mechanics() -> Mechanics {
         integration_us: [100, 100_000],
         exposures: 9,
         transaction_s: 0.006,
+        in_flight: true,
         flight_s: 0.009,
         warm_up_s: 0.2,
         dark_every_s: 600.0,
