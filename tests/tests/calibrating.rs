@@ -4,10 +4,10 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
 
-/// Servos without play, which would turn every angle by a part of it.
+/// Servos without play and friction, which would turn every angle by a part of them.
 const RIG: &str = "[calibration]\ncertificate = \"required\"\n[sim]\nspecimen = \"lambert:0.5\"\n\
      responsivity_error = 0.05\ngain_error = -0.01\nlight_backlash_deg = 0.0\nsensor_backlash_deg = 0.0\n\
-     light_zero_deg = 0.1\nsensor_zero_deg = 0.1\nstray_per_sr = 0.0003\n";
+     static_error_counts = 0\njitter_counts = 0\nlight_zero_deg = 0.1\nsensor_zero_deg = 0.1\nstray_per_sr = 0.0003\n";
 const JOB: &str = "[[plane]]\ntheta_r_deg = 45\nreadings = 10\n[arc]\nreadings = 8\n";
 
 fn gonioctl(directory: &Path, arguments: &[&str]) -> Output {
