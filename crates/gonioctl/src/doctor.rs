@@ -26,7 +26,7 @@ pub(crate) fn doctor(
     let port = RigPort::new(&file, &name.display().to_string())?;
     let mut findings = Findings::new(as_json);
     examine(port.path(), port.file(&file), out, &mut |finding| {
-        findings.tell(finding)
+        findings.tell(finding);
     })?;
     findings.end(&name, junit)
 }
