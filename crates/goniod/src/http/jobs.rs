@@ -9,7 +9,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::body;
 use super::job_file::JobFile;
-use super::keys::{Asked, with_next};
+use super::keys::{Asked, place, with_next};
 use super::problem::Problem;
 use super::shared::{Shared, long_json};
 use crate::history::USUAL;
@@ -43,6 +43,7 @@ struct Page {
     #[param(minimum = 1, maximum = 200)]
     limit: Option<u32>,
     /// Only those that are over and whose place is before this one.
+    #[serde(default, deserialize_with = "place")]
     before: Option<u64>,
 }
 

@@ -8,7 +8,8 @@ use axum::http::request::Parts;
 use axum::http::{HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, Error as _};
+use serde::{Deserialize, Deserializer};
 use utoipa::openapi::path::{Operation, ParameterIn};
 use utoipa::openapi::{OpenApi, RefOr};
 
@@ -94,6 +95,18 @@ impl<S: Sync, T: DeserializeOwned> FromRequestParts<S> for Asked<T> {
         let Query(asked) = Query::try_from_uri(&parts.uri)
             .map_err(|error| Problem::new(StatusCode::BAD_REQUEST, error.body_text()))?;
         Ok(Self(asked))
+    }
+}
+
+/// A place in the queue or the history that a query names: what the store and the document call a whole number of 64 bits.
+pub(crate) fn place<'de, D: Deserializer<'de>>(value: D) -> Result<Option<u64>, D::Error> {
+    let place = u64::deserialize(value)?;
+    match i64::try_from(place) {
+        Ok(_) => Ok(Some(place)),
+        Err(_) => Err(D::Error::custom(format!(
+            "{place} is no place, allowed are 0 … {}",
+            i64::MAX
+        ))),
     }
 }
 

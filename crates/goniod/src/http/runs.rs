@@ -14,7 +14,7 @@ use utoipa_axum::{router::OpenApiRouter, routes};
 
 use super::body;
 use super::download::{disposition, download_name};
-use super::keys::{Asked, with_next};
+use super::keys::{Asked, place, with_next};
 use super::problem::Problem;
 use super::shared::{Shared, long_json};
 use crate::history::USUAL;
@@ -57,6 +57,7 @@ struct Wanted {
     #[param(minimum = 1, maximum = 200)]
     limit: Option<u32>,
     /// Those whose place is before this one.
+    #[serde(default, deserialize_with = "place")]
     before: Option<u64>,
     /// Every word of it is the beginning of a word of the specimen, the job file's name, the record or the id.
     q: Option<String>,

@@ -69,6 +69,7 @@ async fn a_run_is_found_again_by_its_record_which_can_be_corrected() {
     }
     for (wrong, part) in [
         ("limit=0", "1 … 200"),
+        ("before=9223372036854775808", "0 … 9223372036854775807"),
         ("limit=201", "1 … 200"),
         ("from=yesterday", "2026-12-01"),
         ("state=asleep", "unknown variant"),
