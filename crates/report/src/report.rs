@@ -226,9 +226,10 @@ impl Examined {
             checks::reflectance(&measurements, &job),
         ];
         checks.extend(inputs(&measurements, records, &rig));
-        checks.extend(check(&run, &job, &measurements));
+        let planes = planes(&job, &measurements);
+        checks.extend(check(&run, &job, &planes, &measurements));
         if let Some(model) = &model {
-            checks.extend(check_model(model.as_ref(), &job, &measurements, &rig));
+            checks.extend(check_model(model.as_ref(), &job, &planes, &rig));
         }
         run.judge(Verdict::overall(&checks, run.complete()));
         Ok(Self {
@@ -325,16 +326,14 @@ fn inputs(measurements: &[Measurement], records: &[Record], rig: &RigFile) -> Ve
 }
 
 /// What the readings say of the measurement, whatever is made of them.
-fn check(run: &Run, job: &Job, measurements: &[Measurement]) -> Vec<Check> {
+fn check(run: &Run, job: &Job, planes: &[PlaneTold], measurements: &[Measurement]) -> Vec<Check> {
     let mut checks = vec![checks::bus(run)];
-    let of_planes = planes(job, measurements);
     if let Some(arc) = &job.arc {
         let of_arc = told(measurements, Sweep::Arc);
-        let crossing =
-            |(plane, theta_r): &(Vec<Told>, f64)| checks::crossing(plane, &of_arc, *theta_r, arc.offset);
-        checks.extend(of_planes.iter().map(crossing));
+        let crossing = |(plane, theta_r): &PlaneTold| checks::crossing(plane, &of_arc, *theta_r, arc.offset);
+        checks.extend(planes.iter().map(crossing));
     }
-    let pairs = of_planes.windows(2).map(|pair| {
+    let pairs = planes.windows(2).map(|pair| {
         let [first, second] = [0, 1].map(|i| (pair[i].0.as_slice(), pair[i].1));
         checks::helmholtz(first, second)
     });
@@ -342,18 +341,21 @@ fn check(run: &Run, job: &Job, measurements: &[Measurement]) -> Vec<Check> {
     checks
 }
 
-/// What each plane of a job tells, and its θ_r.
-fn planes(job: &Job, measurements: &[Measurement]) -> Vec<(Vec<Told>, f64)> {
+/// What a plane tells, and its θ_r.
+type PlaneTold = (Vec<Told>, f64);
+
+/// What each plane of a job tells.
+fn planes(job: &Job, measurements: &[Measurement]) -> Vec<PlaneTold> {
     let plane = |(i, plane): (usize, &sweep::Plane)| (told(measurements, Sweep::Plane(i)), plane.theta_r);
     job.planes.iter().enumerate().map(plane).collect()
 }
 
 /// What is to be said of a model. Who names another one than the usual on purpose knows what it takes for granted, and is
 /// told at worst to look: its readings may be perfectly good.
-fn check_model(model: &dyn Model, job: &Job, measurements: &[Measurement], rig: &RigFile) -> Vec<Check> {
+fn check_model(model: &dyn Model, job: &Job, planes: &[PlaneTold], rig: &RigFile) -> Vec<Check> {
     let azimuths = if model.phi_p_constant() { 1 } else { AZIMUTHS };
-    let sides = |(plane, theta_r): &(Vec<Told>, f64)| checks::sides(plane, *theta_r, model.phi_p_constant());
-    let mut checks: Vec<Check> = planes(job, measurements).iter().map(sides).collect();
+    let sides = |(plane, theta_r): &PlaneTold| checks::sides(plane, *theta_r, model.phi_p_constant());
+    let mut checks: Vec<Check> = planes.iter().map(sides).collect();
     checks.push(checks::coverage(model, &rig.envelope, job.arc.is_some()));
     checks.push(checks::energy(model, job.scene.as_ref(), azimuths));
     if job.model != sweep::Model::default() {

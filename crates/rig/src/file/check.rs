@@ -17,9 +17,6 @@ use crate::{Axis, Calibration, Lamp, RigError};
 mod calibration;
 mod suspend;
 
-/// Characters of what a rig is called.
-const ABOUT: usize = 200;
-
 /// The text checked: each key for itself, then what keys say together.
 pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
     let raw = source.raw(RigFile::BUILT_IN)?;
@@ -78,18 +75,7 @@ pub(super) fn file(source: &Source<'_>) -> Result<RigFile, RigError> {
 
 /// What the rig is called.
 fn about(source: &Source<'_>, raw: &RawAbout) -> Result<About, RigError> {
-    let line = |key: &str, value: &Spanned<String>| {
-        let text = value.get_ref().trim();
-        match text.chars().count() <= ABOUT && !text.chars().any(char::is_control) {
-            true => Ok(text.to_owned()),
-            false => Err(source.refuse(
-                key,
-                value,
-                format!("{text:?}"),
-                "a line of at most 200 characters",
-            )),
-        }
-    };
+    let line = |key: &str, value: &Spanned<String>| source.line(key, value, value.get_ref().trim());
     Ok(About {
         name: line("rig.name", &raw.name)?,
         id: line("rig.id", &raw.id)?,

@@ -6,9 +6,6 @@ use super::{PhotometerSettings, Port, RigFile, Visits};
 use crate::drivers::scpi::{PROFILES, Profile};
 use crate::{Lamp, RigError};
 
-/// Characters of a command.
-const COMMAND: usize = 200;
-
 /// Longest time that a connection takes.
 pub(crate) const CONNECTION: Duration = Duration::from_secs(2);
 
@@ -160,17 +157,7 @@ pub(super) fn detector(
     port: &Port,
 ) -> Result<DetectorSettings, RigError> {
     let text = |key: &str, value: &toml::Spanned<String>| {
-        let key = format!("detector.{key}");
-        let text = value.get_ref();
-        match text.chars().count() <= COMMAND && !text.chars().any(char::is_control) {
-            true => Ok(text.clone()),
-            false => Err(source.refuse(
-                &key,
-                value,
-                format!("{text:?}"),
-                "a line of at most 200 characters",
-            )),
-        }
+        source.line(&format!("detector.{key}"), value, value.get_ref())
     };
     let kinds = [("node", DetectorKind::Node), ("scpi", DetectorKind::Scpi)];
     let kind = source.one_of("detector.kind", &raw.kind, &kinds)?;

@@ -10,6 +10,9 @@ use super::raw::RawFile;
 use crate::RigError;
 use crate::error::Place;
 
+/// Characters of a text that stands in one line.
+const LINE: usize = 200;
+
 /// Span of values that come from the built-in file: no line of the user's file is to blame for them.
 const BUILT_IN: Range<usize> = 0..0;
 
@@ -118,6 +121,17 @@ impl Source<'_> {
             line: span
                 .and_then(before)
                 .map(|text| text.bytes().filter(|&b| b == b'\n').count() + 1),
+        }
+    }
+
+    /// What a key holds as one line of text: `text`, the value or what counts of it.
+    pub(super) fn line(&self, key: &str, value: &Spanned<String>, text: &str) -> Result<String, RigError> {
+        match text.chars().count() <= LINE && !text.chars().any(char::is_control) {
+            true => Ok(text.to_owned()),
+            false => {
+                let allowed = format!("a line of at most {LINE} characters");
+                Err(self.refuse(key, value, format!("{text:?}"), allowed))
+            }
         }
     }
 
