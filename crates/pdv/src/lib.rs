@@ -38,6 +38,7 @@ mod centre;
 mod choice;
 mod compare;
 mod coordinates;
+mod course;
 mod density;
 mod error;
 mod expectation;

@@ -1,5 +1,6 @@
 use glam::DVec3;
 
+use crate::course::Course;
 use crate::sweeps::{Point, Side};
 use crate::{Error, Factor};
 
@@ -10,7 +11,7 @@ const HIDDEN: f64 = 0.02;
 /// What rounding may carry a half angle beyond the end of its own side, rad.
 const ROUNDING: f64 = 1e-9;
 
-/// G(θ_h, θ_d), the lobe relative to its peak, from the sides of the planes.
+/// G(θ_h, θ_d), the lobe relative to its peak, from the sides of planes and of other curves.
 ///
 /// Along a side θ_h runs and θ_d follows from it. Elsewhere ln G is linear in θ_d between the sides next to it.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,7 +21,7 @@ pub(crate) struct Lobe {
 
 #[derive(Clone, Debug, PartialEq)]
 struct Curve {
-    theta_r: f64,
+    course: Course,
     sign: f64,
     from: f64,
     to: f64,
@@ -44,7 +45,7 @@ impl Curve {
     /// θ_d of the curve at a half angle.
     #[inline]
     fn theta_d(&self, theta_h: f64) -> f64 {
-        (self.sign * theta_h - self.theta_r).abs()
+        self.course.theta_d(self.sign * theta_h)
     }
 
     #[inline]
@@ -58,7 +59,7 @@ type Neighbour = Option<(f64, usize)>;
 
 /// ln(1 + θ_h/knee).
 #[inline]
-fn warped(theta_h: f64) -> f64 {
+pub(crate) fn warped(theta_h: f64) -> f64 {
     (theta_h / KNEE).ln_1p()
 }
 
@@ -82,12 +83,17 @@ impl Lobe {
             };
             let (log, read) = (points(&shown.log_g), points(&shown.read));
             Ok(Curve {
-                theta_r: side.theta_r,
+                course: side.course.clone(),
                 sign: side.sign,
                 from: if from_peak { 0.0 } else { first },
                 to: side.points[side.points.len() - 1].theta_h.abs(),
                 log: Factor::new("G", added(DVec3::ZERO).into_iter().chain(log))?,
-                read: Factor::new("G", added((shown.peak)(side.theta_r)).into_iter().chain(read))?,
+                read: Factor::new(
+                    "G",
+                    added((shown.peak)(side.course.theta_d(0.0)))
+                        .into_iter()
+                        .chain(read),
+                )?,
             })
         };
         Ok(Self {

@@ -1,7 +1,6 @@
 use glam::DVec3;
 
 use crate::bisected::{Bisected, Pair};
-use crate::separable::THETA_R_SPREAD;
 use crate::surface::Surface;
 use crate::sweeps::{Point, Side, Sweeps};
 use crate::{Error, Observation, Scene, Shape};
@@ -136,23 +135,15 @@ impl Reads {
     }
 }
 
-/// Marks the readings of the plane to which some points of a side belong, all those at one half angle together.
+/// Marks the readings of the curve to which some points of a side belong, all those at one half angle together.
 fn mark(read: &mut [Vec<bool>], planes: &[Vec<Observation>], side: &Side, points: &[Point]) {
     let ends = [points.first(), points.last()].map(|p| p.map_or(f64::NAN, |p| p.theta_h.abs()));
-    for (read, plane) in read.iter_mut().zip(planes) {
-        if plane
-            .first()
-            .is_none_or(|o| (o.theta_r - side.theta_r).abs() > THETA_R_SPREAD)
-        {
+    for (read, observation) in read[side.curve].iter_mut().zip(&planes[side.curve]) {
+        let Some(point) = Point::new(observation) else {
             continue;
-        }
-        for (read, observation) in read.iter_mut().zip(plane) {
-            let Some(point) = Point::new(observation) else {
-                continue;
-            };
-            let on_side = point.theta_h * side.sign >= 0.0;
-            *read |= on_side && (ends[0]..=ends[1]).contains(&point.theta_h.abs());
-        }
+        };
+        let on_side = point.theta_h * side.sign >= 0.0;
+        *read |= on_side && (ends[0]..=ends[1]).contains(&point.theta_h.abs());
     }
 }
 

@@ -1,11 +1,15 @@
 use glam::DVec3;
 
 use crate::bisected::{Bisected, Cosines};
-use crate::separable::{THETA_R_SPREAD, steady};
+use crate::course::Course;
+use crate::lobe::warped;
 use crate::{Error, Observation, light_angle};
 
 /// Readings closer than this in half angle, rad, are one pose and averaged.
 const SAME: f64 = 1e-7;
+/// Readings of a curve along which both arms move are taken in flight, as dense as they come: those closer than this in
+/// ln(1 + θ_h/knee) are averaged.
+const DENSE: f64 = 0.06;
 /// The least reflectance, sr⁻¹, that is told from black.
 const LEAST: f64 = 1e-9;
 /// Near the peak a reading of less than this share of the faintest one far from it is black: a channel that vanishes at the
@@ -56,10 +60,12 @@ impl Point {
     }
 }
 
-/// One side of the mirror direction in one plane.
+/// One side of the mirror direction on one curve: a plane, or a line along which both arms move.
 #[derive(Clone, Debug)]
 pub(crate) struct Side {
-    pub(crate) theta_r: f64,
+    /// Place of its curve among those of the run.
+    pub(crate) curve: usize,
+    pub(crate) course: Course,
     /// +1 towards the normal, −1 outwards.
     pub(crate) sign: f64,
     /// Ascending in |θ_h|, no two at the same.
@@ -85,13 +91,9 @@ impl Sweeps {
         let mut sides = Vec::new();
         let mut kept = 0;
         let mut peaks = Vec::new();
-        for plane in planes {
-            let theta_r = steady(
-                "θ_r of a plane, in rad,",
-                plane.iter().map(|o| o.theta_r),
-                THETA_R_SPREAD,
-            )?;
+        for (curve, plane) in planes.iter().enumerate() {
             let found = points(plane);
+            let course = Course::of(plane, &found)?;
             kept += found.len();
             peaks.extend(
                 found
@@ -99,11 +101,20 @@ impl Sweeps {
                     .min_by(|a, b| a.theta_h.abs().total_cmp(&b.theta_h.abs())),
             );
             for sign in [1.0, -1.0] {
-                let points = merged(found.iter().filter(|p| p.theta_h * sign >= 0.0));
+                let side = found.iter().filter(|p| p.theta_h * sign >= 0.0);
+                // Where a leg ends, towards grazing, f changes most, and nothing lies beyond.
+                let end = side.clone().map(|p| p.theta_h.abs()).fold(0.0, f64::max);
+                let points = merged(side, |a, b| match course {
+                    Course::Plane { .. } => b.theta_h.abs() - a.theta_h.abs() < SAME,
+                    Course::Leg { .. } => {
+                        b.theta_h.abs() < end && warped(b.theta_h.abs()) - warped(a.theta_h.abs()) < DENSE
+                    }
+                });
                 // A peak alone has no side.
                 if points.last().is_some_and(|p| p.theta_h != 0.0) {
                     sides.push(Side {
-                        theta_r,
+                        curve,
+                        course: course.clone(),
                         sign,
                         points,
                     });
@@ -143,18 +154,41 @@ impl Sweeps {
     }
 }
 
-/// Sorted by |θ_h|, those at one place averaged.
-fn merged<'a>(points: impl Iterator<Item = &'a Point>) -> Vec<Point> {
+/// Sorted by |θ_h|, those at one place averaged: `same` says whether a point is still at the place of the first of them.
+fn merged<'a>(points: impl Iterator<Item = &'a Point>, same: impl Fn(&Point, &Point) -> bool) -> Vec<Point> {
     let mut points: Vec<Point> = points.copied().collect();
     points.sort_by(|a, b| a.theta_h.abs().total_cmp(&b.theta_h.abs()));
-    let mean = |same: &[Point]| Point {
-        rgb: same.iter().map(|p| p.rgb).sum::<DVec3>() / same.len() as f64,
-        ..same[0]
+    let mut merged = Vec::new();
+    let mut rest = points.as_slice();
+    while let Some(first) = rest.first() {
+        let n = rest.iter().position(|p| !same(first, p)).unwrap_or(rest.len());
+        let (at_one_place, after) = rest.split_at(n);
+        merged.push(mean(at_one_place));
+        rest = after;
+    }
+    merged
+}
+
+/// What several readings at nearly one place say of it; at least one.
+fn mean(points: &[Point]) -> Point {
+    let n = points.len() as f64;
+    let of = |value: fn(&Point) -> f64| points.iter().map(value).sum::<f64>() / n;
+    let [theta_h, theta_d] = match points {
+        // Not through a sum, which would round.
+        [one] => return *one,
+        _ => [of(|p| p.theta_h), of(|p| p.theta_d)],
     };
-    points
-        .chunk_by(|a, b| b.theta_h.abs() - a.theta_h.abs() < SAME)
-        .map(mean)
-        .collect()
+    Point {
+        theta_h,
+        theta_d,
+        cos_i: of(|p| p.cos_i),
+        cosines: Bisected {
+            theta_h: theta_h.abs(),
+            theta_d,
+        }
+        .cosines(),
+        rgb: points.iter().map(|p| p.rgb).sum::<DVec3>() / n,
+    }
 }
 
 /// Per channel the faintest reading of the outer halves of the sides; 0 where there is none.

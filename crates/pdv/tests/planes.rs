@@ -340,6 +340,74 @@ fn what_does_not_belong_together_is_refused() {
     ));
 }
 
+/// A line in half and difference angle, degrees, read at `n` places.
+fn leg(brdf: &dyn Brdf, half_deg: [f64; 2], difference_deg: [f64; 2], n: usize) -> Vec<Observation> {
+    let at = |[from, to]: [f64; 2], share: f64| (from + share * (to - from)).to_radians();
+    (0..n)
+        .filter_map(|i| {
+            let share = i as f64 / (n - 1) as f64;
+            let (half, difference) = (at(half_deg, share), at(difference_deg, share));
+            let (light, sensor) = (half - difference, half + difference);
+            Observation::of(brdf, sensor, light.sin() + sensor.sin())
+        })
+        .collect()
+}
+
+/// Where both arms move the model is as good as where the sensor stands, and gives back what was read.
+#[test]
+fn lines_along_which_both_arms_move_make_a_model_as_planes_do() {
+    let corners = [
+        [-3.0, 5.0],
+        [70.0, 15.0],
+        [-3.0, 30.0],
+        [43.0, 42.0],
+        [-3.0, 55.0],
+        [18.0, 67.0],
+        [-3.0, 78.0],
+    ];
+    let draw = Draw {
+        pairs: 20_000,
+        ..Draw::default()
+    };
+    let (mut of_legs, mut of_planes) = (0.0, 0.0);
+    for name in [
+        "gold-paint",
+        "nickel",
+        "blue-rubber",
+        "pink-fabric",
+        "alum-bronze",
+        "yellow-phenolic",
+    ] {
+        let brdf = fitted(name);
+        let legs: Vec<Vec<Observation>> = corners
+            .windows(2)
+            .map(|ends| leg(&brdf, [ends[0][0], ends[1][0]], [ends[0][1], ends[1][1]], 120))
+            .collect();
+        let model = Planes::from_observations(&legs, &[]).unwrap();
+        let planes: Vec<_> = [10.0, 45.0, 75.0]
+            .iter()
+            .map(|&deg| plane(&brdf, deg, 60))
+            .collect();
+        let beside = Planes::from_observations(&planes, &[]).unwrap();
+        let male = |model: &dyn Brdf| compare(&brdf, &[model], &draw)[0].overall.male.unwrap();
+        let (legs_male, planes_male) = (male(&model), male(&beside));
+        println!("{name}: legs {legs_male:.5}, planes {planes_male:.5}");
+        of_legs += legs_male;
+        of_planes += planes_male;
+        for o in legs.iter().flat_map(|leg| leg.iter().step_by(7)) {
+            let (incident, exitant) = o.pdv().directions().unwrap();
+            let found = model.exact(incident, exitant);
+            // Readings that lie densely are averaged.
+            let off = (found / o.rgb - 1.0).abs().max_element();
+            assert!(off < 0.05, "{name}: {found} beside {} that was read", o.rgb);
+        }
+    }
+    assert!(
+        of_legs < of_planes,
+        "mean MALE {of_legs} of legs, {of_planes} of planes"
+    );
+}
+
 #[test]
 fn says_what_it_has_not_measured() {
     let model = model(&fitted("gold-paint"), &[30.0], 30, 30);
