@@ -23,6 +23,6 @@ bench:
 dist:
     packaging/dist
 
-# A trial at full length, by hand: campaign, wire, kills, operator, floods, strangers, host, peer, picture or dist
+# A trial at full length, by hand: campaign, wire, kills, operator, legs, floods, strangers, host, peer, picture or dist
 trials name:
     .ci/trials {{ name }}

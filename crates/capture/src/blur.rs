@@ -1,3 +1,19 @@
+use arms::Pose;
+
+/// How far along a flight each of its poses is, rad: the ways of both arms from pose to pose at right angles to each other, so
+/// that an arm that stands adds nothing.
+pub fn along(poses: impl IntoIterator<Item = Pose>) -> Vec<f64> {
+    let mut before: Option<Pose> = None;
+    let mut along = 0.0;
+    let at = |pose: Pose| {
+        if let Some(from) = before.replace(pose) {
+            along += (pose.light - from.light).hypot(pose.sensor - from.sensor);
+        }
+        along
+    };
+    poses.into_iter().map(at).collect()
+}
+
 /// What an integration over a moving arm adds to a value: the mean over a stretch of width w is w²/24 times the second
 /// derivative above the value in its middle.
 ///

@@ -6,6 +6,7 @@ use crate::Reading;
 
 mod brief;
 
+use brief::allowed_rel;
 pub(crate) use brief::brief;
 
 /// How much brighter than full scale a saturated channel is taken to be.
@@ -60,9 +61,9 @@ impl<'a> Ranging<'a> {
         }
     }
 
-    /// Whether there is a reading of a sweep to range its others from.
-    pub(crate) fn knows(&self, sweep: Sweep) -> bool {
-        self.lit.iter().any(|(of, ..)| *of == sweep)
+    /// Whether there is any lit reading to range others from.
+    pub(crate) fn knows_light(&self) -> bool {
+        !self.lit.is_empty()
     }
 
     /// Exposure for the first reading at a pose.
@@ -110,7 +111,7 @@ impl<'a> Ranging<'a> {
     /// from what the rig file asks for, and at rest there would be time for much less.
     pub(crate) fn too_faint(&self, counts: &Counts) -> bool {
         let rate = self.rate(counts);
-        let noisy = self.noise(rate, counts.exposure) > FAINT * self.photometer.flight_noise_rel;
+        let noisy = self.noise(rate, counts.exposure) > FAINT * allowed_rel(self.file, rate);
         noisy && !counts.saturated && self.quieter(rate, self.aim(rate), counts.exposure)
     }
 
@@ -166,7 +167,7 @@ impl<'a> Ranging<'a> {
     pub(crate) fn predict(&self, sweep: Sweep, pose: Pose) -> Option<f64> {
         let mut last = self.lit.iter().rev().filter(|(of, ..)| *of == sweep);
         let Some(&(_, last_pose, last_rate)) = last.next() else {
-            let distance = |at: &Pose| (at.light - pose.light).abs() + (at.sensor - pose.sensor).abs();
+            let distance = |at: &Pose| apart(at, &pose);
             let nearest = self
                 .lit
                 .iter()
@@ -179,8 +180,9 @@ impl<'a> Ranging<'a> {
         let Some(&(_, before, rate_before)) = last.next() else {
             return Some(last_rate);
         };
-        let step = last_pose.light - before.light;
-        let growth = (last_rate / rate_before).ln() * (pose.light - last_pose.light) / step;
+        let at = |pose: Pose| along(sweep, pose);
+        let step = at(last_pose) - at(before);
+        let growth = (last_rate / rate_before).ln() * (at(pose) - at(last_pose)) / step;
         let growth = if growth.is_finite() {
             growth.clamp(0.0, STEEPEST.ln())
         } else {
@@ -194,7 +196,7 @@ impl<'a> Ranging<'a> {
         let (mut below, mut above) = (None, None);
         for &(of, at, rate) in self.lit.iter().filter(|(of, ..)| *of == sweep) {
             debug_assert_eq!(of, sweep);
-            let off = at.light - pose.light;
+            let off = along(sweep, at) - along(sweep, pose);
             let side = if off <= 0.0 { &mut below } else { &mut above };
             if side.is_none_or(|(nearest, _): (f64, f64)| off.abs() <= nearest) {
                 *side = Some((off.abs(), rate));
@@ -223,6 +225,22 @@ impl<'a> Ranging<'a> {
         let strongest = || Gain::ALL.into_iter().rev().find(fits);
         at(gain.or_else(strongest).unwrap_or(Gain::X1))
     }
+}
+
+/// How far along its sweep a pose is, rad: by the half angle, which the mirror arc alone does not change.
+fn along(sweep: Sweep, pose: Pose) -> f64 {
+    match sweep {
+        Sweep::Arc => pose.light.rad(),
+        _ => pose.light.rad() + pose.sensor.rad(),
+    }
+}
+
+/// How unlike the reflectances at two poses may be, in rad: by isotropy the side of the mirror direction says nothing, and
+/// with the difference angle a reflectance changes less than with the half angle.
+fn apart(a: &Pose, b: &Pose) -> f64 {
+    const DIFFERENCE: f64 = 0.3;
+    let half = |pose: &Pose| (pose.light.rad() + pose.sensor.rad()).abs();
+    (half(a) - half(b)).abs() + DIFFERENCE * (a.separation_rad() - b.separation_rad()).abs()
 }
 
 /// Integration time at gain ×1 that collects as much, µs.

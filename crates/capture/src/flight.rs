@@ -10,6 +10,10 @@ const BRAKING: f64 = 0.6;
 const FILLED: f64 = 0.85;
 /// By how much the newest measure counts in the expected time between two integrations.
 const NEWEST: f64 = 0.3;
+/// How much farther an arm must be allowed to go for it to be told, rad: half a degree.
+const STRIDE_RAD: f64 = 0.0087;
+/// Arms whose ways differ by less than this share move alike.
+const ALIKE: f64 = 0.02;
 /// An infinite acceleration in figures, rad/s²: a thousand times what an arm can do.
 const ABRUPT: f64 = 1e4;
 
@@ -24,6 +28,12 @@ pub(crate) struct Flight<'a> {
     pub(crate) next: usize,
     /// The arms that move, the first one being judged by.
     pub(crate) moving: Vec<Arm>,
+    /// The way of each arm as a share of the first one's.
+    shares: [f64; 2],
+    /// Where the arms were told to go: the end, or as far towards it as was safe.
+    pub(crate) goals: Pose,
+    /// The last pose as the servos take it.
+    last: Pose,
     tracks: [Track; 2],
     /// Angle of the first step, +1 or −1, and the way from there to each step and its cell's ends, rad.
     from: f64,
@@ -46,6 +56,10 @@ impl<'a> Flight<'a> {
         let mut moving: Vec<Arm> = Arm::BOTH.into_iter().filter(|&arm| way(arm) > 0.0).collect();
         moving.sort_by(|&a, &b| way(b).total_cmp(&way(a)));
         let lead = moving.first().copied().unwrap_or(Arm::Light);
+        let shares = Arm::BOTH.map(|arm| match way(arm) / way(lead) {
+            share if (share - 1.0).abs() < ALIKE => 1.0,
+            share => share,
+        });
         let along: Vec<f64> = steps
             .iter()
             .map(|step| (step.pose().angle(lead) - first.angle(lead)).abs())
@@ -67,12 +81,20 @@ impl<'a> Flight<'a> {
             fastest: arm.profile,
             profile: arm.profile,
             moving,
+            shares,
+            goals: first,
+            last: file.nearest(last),
             idle_s,
         }
     }
 
     fn lead(&self) -> &Track {
         &self.tracks[self.moving.first().copied().unwrap_or(Arm::Light) as usize]
+    }
+
+    /// Whether the arms were told to go to the end.
+    pub(crate) fn ends(&self) -> bool {
+        self.goals == self.last
     }
 
     /// Where the pass ends.
@@ -87,12 +109,40 @@ impl<'a> Flight<'a> {
         }
     }
 
-    /// The moving arms were told to go (on) to the end, on the profile that [`Self::pace`] chose.
+    /// The moving arms were told to go (on) to their goals, on the profile that [`Self::pace`] chose.
     pub(crate) fn steered(&mut self, t_s: f64) {
-        for &arm in &self.moving {
-            let goal = self.end().angle(arm).rad();
-            self.tracks[arm as usize].steer(t_s, goal, self.profile);
+        for arm in self.moving.clone() {
+            let goal = self.goals.angle(arm).rad();
+            let profile = self.profile_of(arm);
+            self.tracks[arm as usize].steer(t_s, goal, profile);
         }
+    }
+
+    /// The profile of an arm with which it keeps step with the first one, as nearly as its servo has it.
+    pub(crate) fn profile_of(&self, arm: Arm) -> Profile {
+        let share = self.shares[arm as usize];
+        if share == 1.0 {
+            return self.profile;
+        }
+        // 0 stands for an infinite acceleration.
+        let of = |register: u32| match register {
+            0 => 0,
+            some => ((f64::from(some) * share).round() as u32).max(1),
+        };
+        self.axis
+            .profile(self.axis.profile_registers(self.profile).map(of))
+    }
+
+    /// Takes note of how far the arms may go now; returns whether they must be told.
+    pub(crate) fn lead_to(&mut self, goals: Pose) -> bool {
+        let farther = self.moving.iter().any(|&arm| {
+            let by = (goals.angle(arm) - self.goals.angle(arm)).abs();
+            by >= STRIDE_RAD || (by > 0.0 && goals.angle(arm) == self.last.angle(arm))
+        });
+        if farther {
+            self.goals = goals;
+        }
+        farther
     }
 
     /// Time between two integrations was measured.
@@ -182,11 +232,5 @@ impl<'a> Flight<'a> {
     /// How fast each arm was then, rad/s.
     pub(crate) fn speeds(&self, t_s: f64) -> [f64; 2] {
         self.tracks.each_ref().map(|track| track.speed(t_s))
-    }
-
-    /// The arm's own angle along the pass.
-    pub(crate) fn along(&self, pose: Pose) -> f64 {
-        pose.angle(self.moving.first().copied().unwrap_or(Arm::Light))
-            .rad()
     }
 }

@@ -20,7 +20,7 @@ mod reading;
 mod run;
 mod track;
 
-pub use blur::blur;
+pub use blur::{along, blur};
 pub use error::{CaptureError, JournalError};
 pub use event::{Command, Event, State};
 pub use file_journal::FileJournal;

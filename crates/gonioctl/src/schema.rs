@@ -181,6 +181,10 @@ mod tests {
         let mut tried = 0;
         for (table, before) in [
             ("PlaneTable", "[[plane]]\n"),
+            (
+                "LegTable",
+                "[[leg]]\nhalf_deg = [0, 9]\ndifference_deg = [20, 20]\n",
+            ),
             ("ArcTable", "[arc]\n"),
             ("SceneTable", "[scene]\ndirections = [[0, 10, 0, 10, 1]]\n"),
             ("SweepTable", "[sweep]\n"),
@@ -209,6 +213,6 @@ mod tests {
                 }
             }
         }
-        assert_eq!(tried, 16, "two sides of eight keys");
+        assert_eq!(tried, 18, "two sides of nine keys");
     }
 }

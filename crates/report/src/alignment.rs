@@ -294,7 +294,7 @@ fn curves(measurements: &[Measurement]) -> Vec<Curve> {
     for (i, m) in measurements.iter().enumerate() {
         let [light, sensor] = m.lean;
         let counts = m.reading.accepted && !m.shadowed && m.rgb().is_some();
-        if !counts || !matches!(m.reading.sweep, Sweep::Plane(_)) || light.abs() < LEANS {
+        if !counts || !m.reading.sweep.is_curve() || light.abs() < LEANS {
             continue;
         }
         let lean = [

@@ -9,7 +9,7 @@ use crate::{Measurement, observations};
 
 /// The observations that a model is made of.
 pub struct Sweeps {
-    /// Of each plane of the job, in its order.
+    /// Of each plane and then of each leg of the job, in its order.
     pub planes: Vec<Vec<Observation>>,
     /// Of the arc; empty where the job has none.
     pub arc: Vec<Observation>,
@@ -18,10 +18,10 @@ pub struct Sweeps {
 impl Sweeps {
     /// Sorts measurements by sweep.
     pub fn new(job: &Job, measurements: &[Measurement]) -> Self {
-        let planes = 0..job.planes.len();
         Self {
-            planes: planes
-                .map(|i| observations(measurements, Sweep::Plane(i)))
+            planes: job
+                .curves()
+                .map(|curve| observations(measurements, curve))
                 .collect(),
             arc: observations(measurements, Sweep::Arc),
         }

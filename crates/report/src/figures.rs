@@ -1,4 +1,4 @@
-use pdv::{Model, Observation};
+use pdv::{Model, Observation, light_angle};
 
 use crate::ModelUncertainty;
 use crate::plot::{Axis, Mark, Series, svg};
@@ -41,6 +41,40 @@ pub(crate) fn plane(
         theta_r.to_degrees()
     );
     draw(&title, &x, &series.concat())
+}
+
+/// A leg: reflectance over the signed half angle, logarithmic; dots as measured, lines the model along the line that the job
+/// asked for, from which arms that wait for each other depart a little.
+pub(crate) fn leg(
+    index: usize,
+    leg: &sweep::Leg,
+    observations: &[Observation],
+    model: Option<&dyn Model>,
+    uncertainty: Option<&ModelUncertainty<'_>>,
+) -> String {
+    let half_deg = |light: f64, sensor: f64| (light + sensor).to_degrees() / 2.0;
+    let ends = leg.half.map(f64::to_degrees);
+    let x = Axis {
+        label: "half angle in degrees",
+        log: false,
+        bounds: [ends[0].min(ends[1]), ends[0].max(ends[1])],
+    };
+    let along = (0..=LINE).map(|i| {
+        let pose = leg.pose(f64::from(i) / f64::from(LINE));
+        (
+            half_deg(pose.light.rad(), pose.sensor.rad()),
+            pose.sensor.rad(),
+            pose.deviation(),
+        )
+    });
+    let [line, below, above] = band(along, model, uncertainty);
+    let dot = |o: &Observation| {
+        let light = light_angle(o.theta_r, o.deviation)?;
+        Some((half_deg(light, o.theta_r), o.rgb.to_array()))
+    };
+    let dots = series(Mark::Dot, observations.iter().filter_map(dot).collect());
+    let title = format!("Leg {}: reflectance over the half angle", index + 1);
+    draw(&title, &x, &[line, below, above, dots].concat())
 }
 
 /// The arc: reflectance over θ_r, logarithmic; dots as measured, lines the model.

@@ -234,19 +234,15 @@ fn sharpen(measurements: &mut [Measurement], records: &[Record]) {
         }
     }
     for members in flights.values() {
+        let along = capture::along(members.iter().map(|&i| measurements[i].pose));
         let channel = |c: usize| -> Vec<(f64, f64)> {
-            let point = |&i: &usize| {
-                (
-                    measurements[i].pose.light.rad(),
-                    measurements[i].rgb().unwrap_or_default()[c],
-                )
-            };
-            members.iter().map(point).collect()
+            let value = |&i: &usize| measurements[i].rgb().unwrap_or_default()[c];
+            along.iter().copied().zip(members.iter().map(value)).collect()
         };
         let points = [channel(0), channel(1), channel(2)];
         for (at, &i) in members.iter().enumerate() {
             let [light, sensor] = measurements[i].reading.swept_rad.unwrap_or_default();
-            let width = light.abs().max(sensor.abs());
+            let width = light.hypot(sensor);
             let added = points.each_ref().map(|points| capture::blur(points, at, width));
             let sharp = measurements[i]
                 .rgb()

@@ -51,7 +51,7 @@ impl MonteCarlo {
                 visits(measurements, sweep).iter().filter_map(&mut draw).collect()
             };
             let sweeps = Sweeps {
-                planes: (0..job.planes.len()).map(|i| sweep(Sweep::Plane(i))).collect(),
+                planes: job.curves().map(&mut sweep).collect(),
                 arc: sweep(Sweep::Arc),
             };
             sweeps.model(job).ok()

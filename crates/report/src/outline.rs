@@ -33,6 +33,13 @@ pub(crate) fn page<'a>(
             figures::plane(plane.theta_r, observations, model, uncertainty),
         ));
     }
+    let of_legs = sweeps.planes.iter().skip(job.planes.len());
+    for (index, (leg, observations)) in job.legs.iter().zip(of_legs).enumerate() {
+        plots.push((
+            "Both arms moved: dots as measured, lines the model, dashed its 95 % band.",
+            figures::leg(index, leg, observations, model, uncertainty),
+        ));
+    }
     if let Some(arc) = &job.arc {
         plots.push((
             "F: the mirror arc, dots as measured, lines the model, dashed its 95 % band.",

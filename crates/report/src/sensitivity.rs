@@ -55,8 +55,9 @@ pub(crate) fn sensitivities(measurements: &[Measurement], rig: &RigFile) -> Vec<
     let mut found = vec![Sensitivity::default(); measurements.len()];
     let mut sweeps: Vec<Sweep> = measurements.iter().map(|m| m.reading.sweep).collect();
     sweeps.sort_by_key(|sweep| match sweep {
-        Sweep::Plane(index) => *index,
-        _ => usize::MAX,
+        Sweep::Plane(index) => (0, *index),
+        Sweep::Leg(index) => (1, *index),
+        _ => (2, 0),
     });
     sweeps.dedup();
     let Some(lobe) = lobe(measurements, &sweeps) else {
@@ -90,7 +91,7 @@ pub(crate) fn sensitivities(measurements: &[Measurement], rig: &RigFile) -> Vec<
 fn lobe(measurements: &[Measurement], sweeps: &[Sweep]) -> Option<InPlane> {
     let planes: Vec<_> = sweeps
         .iter()
-        .filter(|sweep| matches!(sweep, Sweep::Plane(_)))
+        .filter(|sweep| sweep.is_curve())
         .map(|&sweep| observations(measurements, sweep))
         .collect();
     let arc = observations(measurements, Sweep::Arc);

@@ -17,7 +17,7 @@ const TICK_S: f64 = 1e-5;
 /// What a capture on the simulated rig brought.
 #[derive(Clone, Debug)]
 pub struct Measured {
-    /// Readings of each plane of the job, in its order, and of those that were added.
+    /// Readings of each plane of the job, in its order, of those that were added, and of each leg.
     pub planes: Vec<Vec<Observation>>,
     /// Readings of the arc.
     pub arc: Vec<Observation>,
@@ -25,7 +25,7 @@ pub struct Measured {
     pub readings: usize,
     /// Everything that was exposed, dark readings and repeated exposures too.
     pub exposures: usize,
-    /// Seconds that the rig took: the photometer's clock from power-on to the end, and for each exposure the time
+    /// Seconds that the rig took: the photometer's clock from power-on to the end, and for each exposure at rest the time
     /// that its packets need on the bus, which the in-process rig does not have.
     pub rig_s: f64,
     /// What was added on the way, of a job that says when to stop.
@@ -40,9 +40,10 @@ pub fn measure(job: &Job, rig: &RigFile, specimen: Arc<dyn Brdf>) -> Result<Meas
     let Capture { records, bus_s } = Capture::new(job, rig, specimen)?;
     let measurements = report::measurements(&records, rig);
     let plan = capture::extended_plan(&records);
-    let planes = plan.map_or(job.planes.len(), |plan| job.grown(&plan).planes.len());
-    let planes: Vec<_> = (0..planes)
-        .map(|i| report::observations(&measurements, Sweep::Plane(i)))
+    let grown = plan.map_or_else(|| job.clone(), |plan| job.grown(&plan));
+    let planes: Vec<_> = grown
+        .curves()
+        .map(|curve| report::observations(&measurements, curve))
         .collect();
     let arc = report::observations(&measurements, Sweep::Arc);
     let ends = || {
@@ -52,11 +53,16 @@ pub fn measure(job: &Job, rig: &RigFile, specimen: Arc<dyn Brdf>) -> Result<Meas
             _ => None,
         })
     };
+    // In flight the packets pass while the arms move.
+    let at_rest = measurements
+        .iter()
+        .filter(|m| m.reading.swept_rad.is_none())
+        .count();
     let ticks = ends().max().unwrap_or_default() - ends().min().unwrap_or_default();
     Ok(Measured {
         readings: planes.iter().map(Vec::len).sum::<usize>() + arc.len(),
         exposures: measurements.len(),
-        rig_s: ticks as f64 * TICK_S + measurements.len() as f64 * bus_s,
+        rig_s: ticks as f64 * TICK_S + at_rest as f64 * bus_s,
         planes,
         arc,
         adapted: report::Adapted::new(&records),

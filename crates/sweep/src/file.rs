@@ -5,17 +5,19 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::first::first;
-use crate::{Arc, Distribution, FORMATS, Job, Mode, Model, Plane, SweepError};
+use crate::{Arc, Distribution, FORMATS, Job, Leg, Mode, Model, Plane, SweepError};
 
+mod leg;
 mod record;
 mod scene;
 mod until;
 
+use leg::{RawLeg, RawSnake};
 use record::{RawRun, RawSpecimen};
 use scene::RawScene;
 use until::RawSweep;
 
-/// Most plane sweeps of one job: their order is found by trying every one.
+/// Most planes and legs of one job together: their order is found by trying every one.
 pub const MAX_PLANES: usize = 12;
 /// Degrees from the normal at which a plane's sensor may stand.
 pub const THETA_R_DEG: RangeInclusive<f64> = 0.0..=85.0;
@@ -37,6 +39,9 @@ struct RawJob {
     formats: Vec<Spanned<String>>,
     #[serde(default)]
     plane: Vec<RawPlane>,
+    #[serde(default)]
+    leg: Vec<RawLeg>,
+    snake: Option<RawSnake>,
     arc: Option<RawArc>,
     #[serde(default)]
     reconstruction: RawReconstruction,
@@ -186,7 +191,7 @@ impl Job {
     ///
     /// # Errors
     /// Names file, line, key and what is allowed: unknown or missing keys, wrong types, values out of range, more than
-    /// 12 planes, or none without a target or a budget.
+    /// 12 planes and legs, legs with another model than "planes" or with a target, or none without a target or a budget.
     pub fn parse(text: &str, name: &str) -> Result<Self, SweepError> {
         let source = Source { text, name };
         let raw: RawJob = config::parse(text).map_err(|flaws| source.form(&flaws))?;
@@ -196,12 +201,32 @@ impl Job {
             .map(|sweep| sweep.check(&source, raw.reconstruction.model))
             .transpose()?
             .flatten();
-        if raw.plane.len() > MAX_PLANES || (raw.plane.is_empty() && until.is_none()) {
+        let legs = raw.leg.iter().enumerate().map(|(i, leg)| leg.check(i, &source));
+        let mut legs: Vec<Leg> = legs.collect::<Result<_, _>>()?;
+        if let Some(snake) = &raw.snake {
+            legs.extend(snake.check(&source)?);
+        }
+        let curves = raw.plane.len() + legs.len();
+        if curves > MAX_PLANES || (curves == 0 && until.is_none()) {
             let why = format!(
-                "{} planes, allowed are 1 … {MAX_PLANES}, or none where sweep.target_male or sweep.budget_s is given",
-                raw.plane.len()
+                "{} planes and {} legs, allowed are 1 … {MAX_PLANES} together, or none where sweep.target_male or \
+                 sweep.budget_s is given",
+                raw.plane.len(),
+                legs.len()
             );
             return Err(source.refuse(None, "[[plane]]", why));
+        }
+        if !legs.is_empty() && until.is_some() {
+            let why =
+                "what is added on the way are planes; a job with legs has neither target_male nor budget_s";
+            return Err(source.refuse(None, "sweep", why));
+        }
+        if !legs.is_empty() && raw.reconstruction.model != Model::Planes {
+            let why = format!(
+                "readings of legs make the model \"planes\" alone, this job's is \"{}\"",
+                raw.reconstruction.model.name()
+            );
+            return Err(source.refuse(None, "reconstruction.model", why));
         }
         let scene = raw.scene.map(|scene| scene.check(&source)).transpose()?;
         let planes = raw.plane.iter().enumerate();
@@ -209,7 +234,7 @@ impl Job {
             .map(|(i, plane)| plane.check(i, &source))
             .collect::<Result<_, _>>()?;
         let mut arc = raw.arc.map(|arc| arc.check(&source)).transpose()?;
-        if planes.is_empty() {
+        if planes.is_empty() && legs.is_empty() {
             let (first, along) = first(scene.as_ref());
             planes = first;
             arc = arc.or(Some(along));
@@ -222,6 +247,7 @@ impl Job {
             project,
             on_stage: raw.on_stage,
             planes,
+            legs,
             arc,
             mode: raw.sweep.as_ref().map_or(Mode::Step, |sweep| sweep.mode),
             passes: raw.sweep.as_ref().map_or(Ok(1), |sweep| sweep.passes(&source))?,

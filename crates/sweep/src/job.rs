@@ -1,7 +1,7 @@
 use pdv::{Distribution, Scene};
 use serde::{Deserialize, Serialize};
 
-use crate::Specimen;
+use crate::{Leg, Specimen, Sweep};
 
 /// The formats that a job may ask for; a test of `report` compares them with the crate `formats`.
 pub const FORMATS: [&str; 12] = [
@@ -32,8 +32,10 @@ pub struct Job {
     pub project: String,
     /// Whether that lies on the stage already, so that nobody need be asked before it is measured.
     pub on_stage: bool,
-    /// Plane sweeps, at least one.
+    /// Plane sweeps; at least one of planes and legs.
     pub planes: Vec<Plane>,
+    /// Lines along which both arms move.
+    pub legs: Vec<Leg>,
     /// The mirror arc.
     pub arc: Option<Arc>,
     /// How the arms take the readings.
@@ -49,6 +51,14 @@ pub struct Job {
     /// When to stop; `None`: when everything that the job names was measured. Else its planes and arc are the first, and
     /// what follows is decided on the way.
     pub until: Option<Until>,
+}
+
+impl Job {
+    /// The curves of the job over the half angle, in the order in which models are made of them: its planes, then its legs.
+    pub fn curves(&self) -> impl Iterator<Item = Sweep> + use<> {
+        let planes = (0..self.planes.len()).map(Sweep::Plane);
+        planes.chain((0..self.legs.len()).map(Sweep::Leg))
+    }
 }
 
 /// When a run stops to which sweeps are added on the way. It also does where nothing is expected to gain any more.

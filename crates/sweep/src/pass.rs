@@ -12,7 +12,9 @@ const ALIKE_STEPS: f64 = 1.5;
 /// flown: fewer than three poses, arms that would not move alike, or a stretch between its ends that the envelope forbids.
 ///
 /// Each pose has its cell, half-way to its neighbours, in which its light is collected; the arms go no faster than that,
-/// and no faster than their profile.
+/// and no faster than their profile. Where the arms could meet if one of them stood still, each is sent no farther than is
+/// safe from where the other measurably is; then the way from each pose to the next must be free, and the time that this may
+/// cost is left out.
 pub(crate) fn pass(mechanics: &Mechanics, poses: &[Pose]) -> Option<Vec<f64>> {
     let (first, last) = (*poses.first()?, *poses.last()?);
     let way = |pose: &Pose, arm: Arm| (pose.angle(arm) - first.angle(arm)).abs();
@@ -20,9 +22,7 @@ pub(crate) fn pass(mechanics: &Mechanics, poses: &[Pose]) -> Option<Vec<f64>> {
         true => Arm::Light,
         false => Arm::Sensor,
     };
-    let sound = poses.len() >= FEWEST
-        && together(mechanics, poses, lead)
-        && mechanics.envelope.check_path(first, last).is_ok();
+    let sound = poses.len() >= FEWEST && together(mechanics, poses, lead) && free(mechanics, poses);
     let along: Vec<f64> = poses.iter().map(|pose| way(pose, lead)).collect();
     let onward = along.windows(2).all(|pair| pair[0] < pair[1]);
     let margin_rad = mechanics.margin_rad + mechanics.tolerance_rad;
@@ -34,7 +34,16 @@ pub(crate) fn pass(mechanics: &Mechanics, poses: &[Pose]) -> Option<Vec<f64>> {
     (sound && onward).then(|| seconds(&along, &widths, profile, mechanics.flight_s))
 }
 
-/// Whether the other arm stands, or goes as far as the lead at every pose, on the same servo and profile.
+/// Whether nothing is in the way of the arms from each pose to the next.
+fn free(mechanics: &Mechanics, poses: &[Pose]) -> bool {
+    let safe = |from: Pose, to: Pose| mechanics.envelope.check_path(from, to).is_ok();
+    let (Some(&first), Some(&last)) = (poses.first(), poses.last()) else {
+        return false;
+    };
+    safe(first, last) || poses.windows(2).all(|pair| safe(pair[0], pair[1]))
+}
+
+/// Whether the other arm stands, or goes the same share of its way as the lead at every pose, on the same servo and profile.
 fn together(mechanics: &Mechanics, poses: &[Pose], lead: Arm) -> bool {
     let other = match lead {
         Arm::Light => Arm::Sensor,
@@ -45,7 +54,10 @@ fn together(mechanics: &Mechanics, poses: &[Pose], lead: Arm) -> bool {
         return true;
     }
     let resolution = mechanics.resolution_rad;
-    let alike = |pose: &Pose| (way(pose, lead) - way(pose, other)).abs() <= ALIKE_STEPS * resolution[0];
+    let last = poses[poses.len() - 1];
+    let ratio = way(&last, other) / way(&last, lead);
+    let alike =
+        |pose: &Pose| (ratio * way(pose, lead) - way(pose, other)).abs() <= ALIKE_STEPS * resolution[0];
     mechanics.profiles[0] == mechanics.profiles[1]
         && resolution[0] == resolution[1]
         && poses.iter().all(alike)

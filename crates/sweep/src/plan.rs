@@ -9,6 +9,8 @@ pub enum Sweep {
     Dark,
     /// A plane sweep, by its index in the job.
     Plane(usize),
+    /// A line along which both arms move, by its index in the job.
+    Leg(usize),
     /// The mirror arc.
     Arc,
     /// A visit to the reference pose, or to a standard in a calibration.
@@ -17,11 +19,19 @@ pub enum Sweep {
     Repeat,
 }
 
+impl Sweep {
+    /// Whether it runs over the half angle: a plane or a leg.
+    pub fn is_curve(self) -> bool {
+        matches!(self, Self::Plane(_) | Self::Leg(_))
+    }
+}
+
 impl std::fmt::Display for Sweep {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Dark => f.write_str("dark"),
             Self::Plane(index) => write!(f, "plane {index}"),
+            Self::Leg(index) => write!(f, "leg {index}"),
             Self::Arc => f.write_str("arc"),
             Self::Reference => f.write_str("reference"),
             Self::Repeat => f.write_str("repeat"),

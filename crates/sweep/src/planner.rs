@@ -1,5 +1,6 @@
 use arms::{Arm, Pose};
 
+use crate::leg::leg;
 use crate::order::order;
 use crate::pass::pass;
 use crate::reach::Reach;
@@ -37,6 +38,9 @@ pub fn plan(job: &Job, mechanics: &Mechanics) -> Result<Plan, SweepError> {
     let mut sweeps: Vec<Targets> = (0..job.planes.len())
         .map(|index| plane(job, index, reach))
         .collect::<Result<_, _>>()?;
+    for index in 0..job.legs.len() {
+        sweeps.push(leg(job, index, reach)?);
+    }
     if let Some(of) = &job.arc {
         sweeps.push(arc(job, of, reach)?);
     }
@@ -233,6 +237,8 @@ pub(crate) struct Draft<'a> {
     since_visit_s: f64,
     /// Whether the lamp must come on again, after dark readings that were not the first.
     cold: bool,
+    /// Whether anything lit was read, which tells how bright the first reading of a sweep may be.
+    lit: bool,
 }
 
 impl<'a> Draft<'a> {
@@ -246,6 +252,7 @@ impl<'a> Draft<'a> {
             since_dark_s: 0.0,
             since_visit_s: 0.0,
             cold: false,
+            lit: false,
         }
     }
 
@@ -257,6 +264,7 @@ impl<'a> Draft<'a> {
         };
         Self {
             dark_sets: 1,
+            lit: steps.iter().any(|step| step.lamp),
             passes: steps
                 .iter()
                 .filter_map(|step| step.pass)
@@ -398,8 +406,8 @@ impl<'a> Draft<'a> {
         targets: &mut Targets,
         mut poses: Vec<Pose>,
     ) -> Result<(), SweepError> {
-        for pass in 0..job.passes {
-            let first = pass == 0;
+        for _ in 0..job.passes {
+            let first = !self.lit;
             self.upkeep(&job.name)?;
             let way = route(self.mechanics, self.standing, poses[0]);
             let (Some(route), Some(seconds)) = (way, self.pass_s(&poses, first)) else {
@@ -431,7 +439,7 @@ impl<'a> Draft<'a> {
         Ok(())
     }
 
-    /// Seconds from each pose of a pass to the next, with the reading that the first pass of a sweep begins with at rest:
+    /// Seconds from each pose of a pass to the next, with the reading that the first pass of a plan begins with at rest:
     /// nothing tells before how bright it is there. The arms then rest once more, at the second pose.
     fn pass_s(&self, poses: &[Pose], first: bool) -> Option<Vec<f64>> {
         let seconds = pass(self.mechanics, poses)?;
@@ -457,6 +465,7 @@ impl<'a> Draft<'a> {
         seconds: f64,
     ) {
         let lamp = sweep != Sweep::Dark;
+        self.lit |= lamp;
         let seconds = match lamp && std::mem::take(&mut self.cold) {
             true => seconds + self.mechanics.warm_up_s,
             false => seconds,

@@ -16,13 +16,13 @@ pub(crate) struct Targets {
 
 /// Poses along one degree of freedom, ascending, cut into stretches where all can be measured or all are hindered
 /// in the same way.
-struct Stretches {
+pub(crate) struct Stretches {
     poses: Vec<Pose>,
     stretches: Vec<(Range<usize>, Option<Hindrance>)>,
 }
 
 impl Stretches {
-    fn new(reach: Reach<'_>, poses: impl Iterator<Item = Pose>) -> Self {
+    pub(crate) fn new(reach: Reach<'_>, poses: impl Iterator<Item = Pose>) -> Self {
         let poses: Vec<Pose> = poses.collect();
         let mut stretches: Vec<(Range<usize>, Option<Hindrance>)> = Vec::new();
         for (i, &pose) in poses.iter().enumerate() {
@@ -40,8 +40,14 @@ impl Stretches {
         free.map(|(range, _)| &self.poses[range.clone()])
     }
 
+    /// The longest stretch that can be measured, by the places of its poses.
+    pub(crate) fn longest(&self) -> Option<Range<usize>> {
+        let free = self.stretches.iter().filter(|(_, hindrance)| hindrance.is_none());
+        free.map(|(range, _)| range.clone()).max_by_key(Range::len)
+    }
+
     /// What hinders most of the poses, in words.
-    fn why_not(&self, reach: Reach<'_>) -> String {
+    pub(crate) fn why_not(&self, reach: Reach<'_>) -> String {
         let most = self.stretches.iter().max_by_key(|(range, _)| range.len());
         most.and_then(|(_, hindrance)| hindrance.as_ref()).map_or_else(
             || "no pose has that deviation".to_owned(),
@@ -50,7 +56,7 @@ impl Stretches {
     }
 
     /// The hindered stretches in words; their readings went to the rest of the sweep.
-    fn left_out(&self, reach: Reach<'_>, sweep: &str, arm: Arm) -> Vec<LeftOut> {
+    pub(crate) fn left_out(&self, reach: Reach<'_>, sweep: &str, arm: Arm) -> Vec<LeftOut> {
         let describe = |(range, hindrance): &(Range<usize>, Option<Hindrance>)| {
             let [first, last] = [range.start, range.end - 1].map(|i| self.poses[i].angle(arm).deg());
             Some(LeftOut {

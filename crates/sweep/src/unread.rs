@@ -140,6 +140,7 @@ fn keep(sweep: &mut Targets, read: &[bool], whole: &Plan) {
 fn stretch(sweep: Sweep, poses: &[Pose]) -> String {
     let (arm, name) = match sweep {
         Sweep::Arc => (Arm::Sensor, "arc".to_owned()),
+        Sweep::Leg(_) => (Arm::Sensor, sweep.to_string()),
         _ => (Arm::Light, format!("plane {:.1}°", poses[0].sensor.deg())),
     };
     let [first, last] = [poses[0], poses[poses.len() - 1]].map(|pose| pose.angle(arm).deg());

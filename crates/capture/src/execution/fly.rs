@@ -7,7 +7,7 @@ use sweep::Step;
 use super::{Execution, Interrupt, TICKS_PER_S};
 use crate::exposure::{Ranging, brief};
 use crate::flight::Flight;
-use crate::{Command, Event, Flag, blur};
+use crate::{Command, Event, Flag, along, blur};
 
 /// Time between two observations of arms in flight, where the bus has nothing else to do: enough of them for where the arms
 /// were to be known better than their encoders show it.
@@ -27,8 +27,8 @@ const IDLE_S: f64 = 0.002;
 
 impl<R: Rig> Execution<'_, R> {
     /// Flies the pass to which a step belongs, again where it was held. Its readings count once it has landed;
-    /// those that are saturated, too faint, blurred, shadowed or missing are left to be taken at rest. So is the first of a sweep,
-    /// before it: the arms stand there, and how bright it is nothing else tells.
+    /// those that are saturated, too faint, blurred, shadowed or missing are left to be taken at rest. So is the first of a
+    /// run, before it: the arms stand there, and how bright it is nothing else tells.
     pub(super) async fn pass(&mut self, pass: usize) -> Result<(), Interrupt<R::Error>> {
         loop {
             let first = self.undone(pass).next().map(Step::pose);
@@ -38,7 +38,7 @@ impl<R: Rig> Execution<'_, R> {
             let steps: Vec<Step> = self.undone(pass).cloned().collect();
             let landed = match steps.first().map(|step| step.lamp) {
                 None => true,
-                Some(true) if !self.ranging.knows(steps[0].sweep) => {
+                Some(true) if !self.ranging.knows_light() => {
                     self.step(&steps[0]).await?;
                     false
                 }
@@ -108,7 +108,8 @@ impl<R: Rig> Execution<'_, R> {
         self.pace(flight, &ranging, now_s);
         self.steer(flight).await?;
         let (_, now_s) = self.sight(flight).await?;
-        self.drive.set_off(flight.end()).await?;
+        flight.goals = self.drive.ahead(flight.end()).await?;
+        self.drive.set_off(flight.goals).await?;
         flight.steered(now_s);
         let mut retries = self.drive.retries();
         while flight.next < flight.steps.len() {
@@ -119,7 +120,10 @@ impl<R: Rig> Execution<'_, R> {
                 return Ok(false);
             }
             let (seen, now_s) = self.sight(flight).await?;
-            if self.pace(flight, &ranging, now_s) {
+            let paced = self.pace(flight, &ranging, now_s);
+            if self.lead(flight).await? {
+                flight.steered(now_s);
+            } else if paced {
                 self.steer(flight).await?;
                 flight.steered(now_s);
             }
@@ -151,15 +155,45 @@ impl<R: Rig> Execution<'_, R> {
                 flight.skip_missed(after_s, |step| self.needed_s(&ranging, step));
             }
         }
+        // An arm that waited for the other has still to be let go to the end.
+        while !flight.ends() {
+            if self.held() || self.unfit_now().await? {
+                return Ok(false);
+            }
+            let (seen, now_s) = self.sight(flight).await?;
+            self.check_flight(flight, &seen, now_s)?;
+            if self.lead(flight).await? {
+                flight.steered(now_s);
+            }
+            self.drive.wait(SIGHT).await?;
+        }
         Ok(true)
     }
 
     /// Gives the moving arms the profile that the flight chose.
     async fn steer(&mut self, flight: &Flight<'_>) -> Result<(), Interrupt<R::Error>> {
         for &arm in &flight.moving {
-            self.drive.steer(arm, flight.profile).await?;
+            self.drive.steer(arm, flight.profile_of(arm)).await?;
         }
         Ok(())
+    }
+
+    /// Lets the arms go as far as is safe from where they were seen last; returns whether they were told anything.
+    async fn lead(&mut self, flight: &mut Flight<'_>) -> Result<bool, Interrupt<R::Error>> {
+        if flight.ends() {
+            return Ok(false);
+        }
+        let goals = self.drive.ahead(flight.end()).await?;
+        if !flight.lead_to(goals) {
+            return Ok(false);
+        }
+        let arms: Vec<_> = flight
+            .moving
+            .iter()
+            .map(|&arm| (arm, flight.profile_of(arm)))
+            .collect();
+        self.drive.send_on(goals, arms).await?;
+        Ok(true)
     }
 
     /// Observes the rig and tells the flight; also returns when that was, s.
@@ -276,13 +310,14 @@ impl<R: Rig> Execution<'_, R> {
                 reading.flags.push(Flag::Shadowed);
             }
         }
-        let points: Vec<(f64, f64)> = readings
-            .iter()
-            .map(|reading| (flight.along(reading.measured), self.ranging.rate(&reading.counts)))
+        let points: Vec<(f64, f64)> = along(readings.iter().map(|reading| reading.measured))
+            .into_iter()
+            .zip(&readings)
+            .map(|(along, reading)| (along, self.ranging.rate(&reading.counts)))
             .collect();
         for (at, mut reading) in readings.into_iter().enumerate() {
             let [light, sensor] = reading.swept_rad.unwrap_or_default();
-            let added = blur(&points, at, light.abs().max(sensor.abs()));
+            let added = blur(&points, at, light.hypot(sensor));
             let unsteady = reading.flags.contains(&Flag::Blurred);
             let shadowed = reading.flags.contains(&Flag::Shadowed);
             let blurred = unsteady || added.abs() > MOST_BLUR * points[at].1.abs();

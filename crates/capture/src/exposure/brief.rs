@@ -4,6 +4,20 @@ use rig::{Exposure, Gain, RigFile};
 /// known, and cannot wait to expose again.
 const HEADROOM: f64 = 1.0 / 16.0;
 
+/// Noise of reflectance times cosine that nothing feels, sr⁻¹: where less light comes than makes this the noise that the rig
+/// file allows, a reading may be noisier in proportion.
+const UNFELT_PER_SR: f64 = 3e-4;
+
+/// The noise that a reading in flight may have at a rate of its brightest channel, counts per µs at gain ×1, relative to it.
+pub(crate) fn allowed_rel(file: &RigFile, rate: f64) -> f64 {
+    let responsivity = file.calibration.responsivity.into_iter().fold(0.0, f64::max);
+    let unfelt = UNFELT_PER_SR * responsivity / rate.max(f64::MIN_POSITIVE);
+    file.photometer.flight_noise_rel.max(unfelt.min(MOST_REL))
+}
+
+/// Beyond this a reading says little even of the dark.
+const MOST_REL: f64 = 0.3;
+
 /// How many exposures in flight are as long as the longest at rest: what needs more light than one is better read at rest.
 const LONGEST: f64 = 2.0;
 
@@ -43,7 +57,7 @@ fn needed_us(file: &RigFile, rate: f64, gain: Gain) -> f64 {
     };
     let converter = known.variance(0.0, gain.factor());
     let b = converter * ((rate * gain.factor()).powi(-2) + monitor.powi(-2));
-    let allowed = file.photometer.flight_noise_rel.powi(2);
+    let allowed = allowed_rel(file, rate).powi(2);
     (a + (a * a + 4.0 * allowed * b).sqrt()) / (2.0 * allowed)
 }
 
@@ -64,7 +78,7 @@ mod tests {
             };
             let gain = exposure.gain.factor();
             let both = noise(rate * us * gain, gain).hypot(noise(file.calibration.monitor * us, 1.0));
-            let allowed = file.photometer.flight_noise_rel;
+            let allowed = allowed_rel(&file, rate);
             println!("{rate} counts/µs: {exposure:?}, noise {:.3} %", both * 100.0);
             if us < f64::from(file.photometer.integration_max_us) / LONGEST {
                 assert!(both <= 1.01 * allowed, "{rate} counts/µs: {both}");

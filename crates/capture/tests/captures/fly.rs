@@ -6,7 +6,6 @@ use capture::{Command, Event, Flag, Outcome, Reading};
 use firmware_sim::{Disturbance, Fault};
 use rig::dynamixel::register;
 use rig::{Device, RigFile};
-use sweep::Sweep;
 
 use crate::bench::{PAPER, SERVOS, Scene, peek};
 
@@ -63,7 +62,7 @@ async fn a_flight_is_three_times_as_fast_as_stopping_and_below_40_s() {
 }
 
 /// Every step has one reading that counts.
-fn assert_each_once(scene: &Scene) {
+pub(crate) fn assert_each_once(scene: &Scene) {
     let mut steps: Vec<usize> = scene.journal.accepted().iter().map(|r| r.step).collect();
     steps.sort_unstable();
     assert_eq!(steps, (0..scene.journal.step_count()).collect::<Vec<_>>());
@@ -108,13 +107,14 @@ async fn a_flight_that_is_stopped_is_safe_and_taken_again() {
                 .filter(|r| r.flags.contains(&Flag::Blurred))
                 .count();
             let kept = scene.journal.readings().len();
+            let all = scene.journal.accepted().len() == scene.journal.step_count();
             scene.control.send_replace(Command::Run);
             assert_eq!(
                 scene.run(|_| ()).await.unwrap(),
                 Outcome::Done,
                 "{command:?} after {ms} ms"
             );
-            assert!(scene.journal.readings().len() > kept);
+            assert!(all || scene.journal.readings().len() > kept);
             assert_each_once(&scene);
             scene.assert_safe();
         }
@@ -228,7 +228,11 @@ async fn what_saturates_in_flight_is_taken_again_at_rest() {
     assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
     assert_each_once(&scene);
     let accepted = scene.journal.accepted();
-    assert!(accepted.iter().all(|r| !r.counts.saturated));
+    // Arms that tremble at the edge of a mirror see it and do not; the last of all exposures counts as it is.
+    const LAST: u32 = 8;
+    let full = |r: &&&Reading| r.counts.saturated && r.attempt < LAST;
+    let counting: Vec<_> = accepted.iter().filter(full).collect();
+    assert!(counting.is_empty(), "{counting:?}");
     let readings = scene.journal.readings();
     let full = |r: &&&Reading| r.swept_rad.is_some() && r.counts.saturated;
     let full: Vec<_> = readings.iter().filter(full).collect();
@@ -296,23 +300,24 @@ async fn what_is_far_too_faint_in_flight_is_taken_again_at_rest() {
     }
 }
 
-/// Chrome is some ten thousand times as bright where its arc begins as where its plane does.
+/// Chrome is some ten thousand times as bright where its arc begins as where its plane does; the plane says so.
 #[tokio::test(start_paused = true)]
-async fn the_first_of_each_sweep_is_ranged_at_rest() {
+async fn the_first_of_a_run_alone_is_ranged_at_rest() {
     let mut scene = Scene::new(SHORT, "specimen = \"chrome\"").await;
     assert_eq!(scene.run(|_| ()).await.unwrap(), Outcome::Done);
     let accepted = scene.journal.accepted();
-    for sweep in [Sweep::Plane(0), Sweep::Arc] {
-        let first = accepted
-            .iter()
-            .find(|r| r.sweep == sweep)
-            .expect("it was measured");
-        assert_eq!(first.swept_rad, None, "{sweep} begins in flight");
-        assert!(first.flags.is_empty(), "{sweep} begins with {:?}", first.flags);
-    }
+    let first = accepted.iter().find(|r| r.lamp).expect("it was measured");
+    assert_eq!(first.swept_rad, None, "{} begins in flight", first.sweep);
+    assert!(first.flags.is_empty(), "it begins with {:?}", first.flags);
+    let ranged = |r: &&&Reading| r.lamp && r.swept_rad.is_none() && r.sweep != first.sweep && r.attempt == 0;
+    assert_eq!(
+        accepted.iter().filter(ranged).count(),
+        0,
+        "a later sweep begins at rest"
+    );
     let refused = |r: &&&Reading| !r.accepted && r.swept_rad.is_some();
     let refused = scene.journal.readings().iter().filter(refused).count();
-    assert_eq!(refused, 0, "readings in flight that do not count");
+    assert!(refused <= 1, "{refused} readings in flight that do not count");
 }
 
 /// Watchdogs that trip after 100 ms hear enough of a flight.

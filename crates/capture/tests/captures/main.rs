@@ -5,6 +5,7 @@ mod extensions;
 mod faults;
 mod fly;
 mod journal;
+mod legs;
 mod light;
 mod operator;
 mod parking;

@@ -26,6 +26,12 @@ pub(crate) struct JobFile {
     #[schema(max_items = 12)]
     #[serde(default)]
     plane: Vec<PlaneTable>,
+    /// Lines along which both arms move.
+    #[schema(max_items = 12)]
+    #[serde(default)]
+    leg: Vec<LegTable>,
+    /// Legs that together cover the plane of the arms.
+    snake: Option<SnakeTable>,
     /// The mirror arc.
     #[serde(default)]
     arc: ArcTable,
@@ -104,6 +110,33 @@ struct PlaneTable {
     /// How d_p is distributed.
     #[serde(default)]
     distribution: DistributionName,
+}
+
+/// A line in half and difference angle, along which both arms move: the light at half − difference, the sensor at half +
+/// difference.
+#[derive(Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "describes, never holds")]
+struct LegTable {
+    /// Half angle at either end, degrees.
+    #[schema(min_items = 2, max_items = 2)]
+    half_deg: Vec<f64>,
+    /// Difference angle at either end, degrees.
+    #[schema(min_items = 2, max_items = 2)]
+    difference_deg: Vec<f64>,
+    /// Readings along it; as many as a flight at the arms' own speed can take unless given.
+    #[schema(minimum = 1, maximum = 2000)]
+    readings: Option<u32>,
+}
+
+/// Legs that together cover the plane of the arms.
+#[derive(Default, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+#[expect(dead_code, reason = "describes, never holds")]
+struct SnakeTable {
+    /// How many: 3, 6 or 10.
+    #[schema(minimum = 3, maximum = 10)]
+    legs: u8,
 }
 
 /// The mirror arc.

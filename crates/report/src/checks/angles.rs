@@ -109,6 +109,7 @@ fn u_before(alignment: &Alignment) -> f64 {
 fn named(sweep: Sweep) -> String {
     match sweep {
         Sweep::Plane(index) => format!("plane {}", index + 1),
+        Sweep::Leg(index) => format!("leg {}", index + 1),
         other => other.to_string(),
     }
 }

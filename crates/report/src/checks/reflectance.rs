@@ -24,7 +24,7 @@ type Found = (Verdict, String);
 /// Whether the readings tell a reflectance at all, in every sweep and in every colour that the job asks for.
 pub(crate) fn reflectance(measurements: &[Measurement], job: &Job) -> Check {
     let counts = |m: &&Measurement| {
-        m.reading.accepted && matches!(m.reading.sweep, Sweep::Plane(_) | Sweep::Arc) && !m.shadowed
+        m.reading.accepted && (m.reading.sweep.is_curve() || m.reading.sweep == Sweep::Arc) && !m.shadowed
     };
     let lit: Vec<&Measurement> = measurements.iter().filter(counts).collect();
     let usable: Vec<&Measurement> = lit.iter().copied().filter(|m| is_usable(m)).collect();
@@ -104,8 +104,9 @@ fn empty_sweeps(lit: &[&Measurement], job: &Job) -> Vec<Found> {
             format!("the plane at {:.0}°", plane.theta_r.to_degrees()),
         )
     });
+    let legs = (0..job.legs.len()).map(|n| (Sweep::Leg(n), format!("leg {}", n + 1)));
     let arc = job.arc.iter().map(|_| (Sweep::Arc, "the arc".to_owned()));
-    let empty = planes.chain(arc).filter(|(sweep, _)| {
+    let empty = planes.chain(legs).chain(arc).filter(|(sweep, _)| {
         let mut of = lit.iter().filter(|m| m.reading.sweep == *sweep).peekable();
         of.peek().is_some() && !of.any(|m| is_usable(m))
     });

@@ -1,9 +1,59 @@
-use arms::{Arm, Pose, Profile};
+use arms::{Arm, ArmAngle, Envelope, Pose, Profile};
 
 use super::{Drive, DriveError};
 use crate::{Actuator, Observation, Rig};
 
+/// How much further apart than the separation the goals keep of arms that could meet if one of them stood still, rad: 2°, more
+/// than an arm rings by when it stops.
+const APART_RAD: f64 = 0.035;
+
 impl<R: Rig> Drive<R> {
+    /// How far both arms may be sent towards a pose at once: to the pose itself where all that the motion can sweep is free,
+    /// from where the arms were last seen; else as far as keeps them 2° further apart than the separation wherever either of
+    /// them stops. Asked again and again on the way, this leads both along beside each other, and if the host, the bus or
+    /// one of them falls silent, each comes to rest by itself at a goal that is safe.
+    ///
+    /// # Errors
+    /// As [`Drive::snapshot`], where nobody looked yet.
+    pub async fn ahead(&mut self, to: Pose) -> Result<Pose, DriveError<R::Error>> {
+        let seen = *self.seen.borrow();
+        let seen = match seen {
+            Some(seen) => seen,
+            None => self.snapshot().await?,
+        };
+        let to = self.file.nearest(to);
+        if self.check(&seen, to).is_ok() {
+            return Ok(to);
+        }
+        Ok(self.file.nearest(beside(&self.file.envelope, seen.pose(), to)))
+    }
+
+    /// Sends arms on to other goals, each on a profile, which stays until the next one or until the arms are engaged. All
+    /// that the motion can sweep is checked first, from where the arms were last seen.
+    ///
+    /// # Errors
+    /// A motion that leaves the envelope (nothing changed), a silent or failing servo.
+    pub async fn send_on(
+        &mut self,
+        to: Pose,
+        arms: impl IntoIterator<Item = (Arm, Profile)>,
+    ) -> Result<(), DriveError<R::Error>> {
+        let seen = *self.seen.borrow();
+        let seen = match seen {
+            Some(seen) => seen,
+            None => self.snapshot().await?,
+        };
+        self.check(&seen, to)?;
+        for (arm, profile) in arms {
+            let goal = to.angle(arm);
+            self.retry("send an arm on", |rig| {
+                Box::pin(rig.axis(arm).steer(goal, profile))
+            })
+            .await?;
+        }
+        Ok(())
+    }
+
     /// Where the arms are, what the photometer's clock says and what it read last, all at one moment.
     ///
     /// # Errors
@@ -52,5 +102,22 @@ impl<R: Rig> Drive<R> {
         };
         self.retry("steer an arm", |rig| Box::pin(rig.axis(arm).steer(goal, profile)))
             .await
+    }
+}
+
+/// As far towards a pose as keeps the arms apart wherever either of them stops, from where they are; neither goes back.
+fn beside(envelope: &Envelope, at: Pose, to: Pose) -> Pose {
+    let apart_rad = envelope.separation_rad + APART_RAD;
+    // +1 where the light is below the sensor.
+    let side = if at.light <= at.sensor { 1.0 } else { -1.0 };
+    let nearest = |of: Arm, other: Arm, side: f64| {
+        let [of_rad, other_rad, to_rad] =
+            [at.angle(of), at.angle(other), to.angle(of)].map(|angle| side * angle.rad());
+        let most_rad = f64::max(other_rad - apart_rad, of_rad);
+        ArmAngle::from_rad(side * to_rad.min(most_rad))
+    };
+    Pose {
+        light: nearest(Arm::Light, Arm::Sensor, side),
+        sensor: nearest(Arm::Sensor, Arm::Light, -side),
     }
 }

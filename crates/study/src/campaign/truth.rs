@@ -80,7 +80,7 @@ fn reconstructed(
         let truth: Vec<Observation> = measured.iter().filter_map(truth).collect();
         (measured, truth)
     };
-    let planes = (0..job.planes.len()).map(|i| sweeps(Sweep::Plane(i)));
+    let planes = job.curves().map(&sweeps);
     let (planes, true_planes): (Vec<_>, Vec<_>) = planes.unzip();
     let (arc, true_arc) = sweeps(Sweep::Arc);
     let found = report::model(job.model, &planes, &arc).map_err(words)?;

@@ -20,11 +20,11 @@ pub(super) struct RawSweep {
 }
 
 impl RawSweep {
-    /// How often each sweep is passed: in flight there and back unless said.
+    /// How often each sweep is passed: once unless said, for what the way back adds is little.
     pub(super) fn passes(&self, source: &Source<'_>) -> Result<usize, SweepError> {
         let fly = self.mode == Mode::Fly;
         let Some(passes) = &self.passes else {
-            return Ok(if fly { 2 } else { 1 });
+            return Ok(1);
         };
         if !fly {
             let why = "arms that stop for each reading pass a sweep once; it is for mode = \"fly\"";

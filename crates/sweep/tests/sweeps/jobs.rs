@@ -102,11 +102,39 @@ fn bad_input_is_named_with_line_key_and_range() {
     let table = [
         (
             "".to_owned(),
-            "job.toml: [[plane]]: 0 planes, allowed are 1 … 12, or none where sweep.target_male or sweep.budget_s is given",
+            "job.toml: [[plane]]: 0 planes and 0 legs, allowed are 1 … 12 together, or none where sweep.target_male or sweep.budget_s is given",
         ),
         (
             plane.repeat(13),
-            "job.toml: [[plane]]: 13 planes, allowed are 1 … 12, or none where sweep.target_male or sweep.budget_s is given",
+            "job.toml: [[plane]]: 13 planes and 0 legs, allowed are 1 … 12 together, or none where sweep.target_male or sweep.budget_s is given",
+        ),
+        (
+            "[snake]\nlegs = 5".to_owned(),
+            "job.toml, line 2: snake.legs: 5 is not one of 3, 6, 10",
+        ),
+        (
+            format!("{}[snake]\nlegs = 10", plane.repeat(3)),
+            "job.toml: [[plane]]: 3 planes and 10 legs, allowed are 1 … 12 together, or none where sweep.target_male or sweep.budget_s is given",
+        ),
+        (
+            "[[leg]]\nhalf_deg = [10.0, 12.0]\ndifference_deg = [20.0, 40.0]".to_owned(),
+            "job.toml, line 2: leg[0].half_deg: from 10 to 12 is less than 5°: a leg runs over the half angle, for the mirror arc there is [arc]",
+        ),
+        (
+            "[[leg]]\nhalf_deg = [-10.0, 20.0]\ndifference_deg = [5.0, 40.0]".to_owned(),
+            "job.toml, line 2: leg[0].half_deg: with a half angle of -10 and a difference angle of 5 the sensor would stand at -5, allowed are 0 … 85",
+        ),
+        (
+            "[[leg]]\nhalf_deg = [0.0, 20.0]\ndifference_deg = [5.0, 86.0]".to_owned(),
+            "job.toml, line 3: leg[0].difference_deg: 86 is not within 0 … 85",
+        ),
+        (
+            "[snake]\nlegs = 3\n[sweep]\ntarget_male = 0.001\n".to_owned(),
+            "job.toml: sweep: what is added on the way are planes; a job with legs has neither target_male nor budget_s",
+        ),
+        (
+            "[snake]\nlegs = 3\n[reconstruction]\nmodel = \"separable\"".to_owned(),
+            "job.toml: reconstruction.model: readings of legs make the model \"planes\" alone, this job's is \"separable\"",
         ),
         (
             "[[plane]]\ntheta_r_deg = 85.1\nreadings = 90".to_owned(),

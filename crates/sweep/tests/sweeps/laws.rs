@@ -62,6 +62,7 @@ prop_compose! {
             project: String::new(),
             on_stage: false,
             planes,
+            legs: Vec::new(),
             arc: arc.map(|(readings, offset)| Arc { readings, offset: if mirror { 0.0 } else { offset } }),
             mode: if fly { Mode::Fly } else { Mode::Step },
             passes,

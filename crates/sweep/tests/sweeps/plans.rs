@@ -378,9 +378,85 @@ fn the_choice_of_exposures_has_its_price_in_the_plan() {
     let fly = PAPER.replace("mode = \"step\"", "mode = \"fly\"");
     let flown = sweep::plan(&job(&fly), &mechanics).unwrap();
     let price = Light::new(&flown, &mechanics);
-    assert_eq!(price.readings, 2 * lit);
+    assert_eq!(price.readings, lit);
     assert!(
-        price.worst_s > flown.seconds() + 2.0 * lit as f64 * 9.0 * 0.106,
+        price.worst_s > flown.seconds() + lit as f64 * 9.0 * 0.106,
         "{price:?}"
     );
+}
+
+const SNAKE: &str = "[snake]\nlegs = 6\n[sweep]\nmode = \"fly\"";
+
+#[test]
+fn a_snake_is_flown_leg_by_leg_without_a_way_between() {
+    for (legs, most_s) in [(3, 7.0), (6, 11.0), (10, 17.0)] {
+        let text = SNAKE.replace('6', &legs.to_string());
+        let plan = plan(&job(&text), &mechanics()).unwrap();
+        println!(
+            "{legs} legs: {:.1} s, {} readings",
+            plan.seconds(),
+            plan.steps.len()
+        );
+        assert!(plan.seconds() < most_s, "{legs} legs take {} s", plan.seconds());
+        let lit: Vec<&Step> = plan.steps.iter().filter(|step| step.lamp).collect();
+        assert!(
+            lit.iter().all(|step| step.pass.is_some()),
+            "not all of it is flown"
+        );
+        // Each begins where the one before ended.
+        for pair in lit.windows(2).filter(|pair| pair[0].sweep != pair[1].sweep) {
+            let [from, to] = [pair[0].pose(), pair[1].pose()];
+            assert!((from.light - to.light).abs() < 1e-9 && (from.sensor - to.sensor).abs() < 1e-9);
+        }
+        for leg in 0..legs {
+            let poses = poses(&plan, Sweep::Leg(leg));
+            assert!(poses.len() > 20, "leg {leg} has {} readings", poses.len());
+            let half: Vec<f64> = poses
+                .iter()
+                .map(|p| (p.light.deg() + p.sensor.deg()) / 2.0)
+                .collect();
+            // Both sides of the mirror direction, read closely about it.
+            assert!(half.iter().any(|&h| h < -1.5) && half.iter().any(|&h| h > 1.5));
+            let near = half
+                .windows(2)
+                .filter(|pair| pair[0].abs() < 2.0 && pair[1].abs() < 2.0);
+            assert!(near.clone().count() > 0 && near.clone().all(|pair| (pair[1] - pair[0]).abs() < 1.0));
+        }
+    }
+}
+
+#[test]
+fn a_leg_has_as_many_readings_as_it_asks_for_and_is_stepped_where_the_job_says_so() {
+    let text = "[[leg]]\nhalf_deg = [-3.0, 43.0]\ndifference_deg = [55.0, 42.0]\nreadings = 17";
+    let plan = plan(&job(text), &mechanics()).unwrap();
+    let steps: Vec<&Step> = steps(&plan, Sweep::Leg(0)).collect();
+    assert_eq!(steps.len(), 17);
+    assert!(steps.iter().all(|step| step.pass.is_none()));
+    let ends = [steps[0].pose(), steps[16].pose()];
+    let expected = [Pose::from_deg(-58.0, 52.0), Pose::from_deg(1.0, 85.0)];
+    let near = |a: Pose, b: Pose| (a.light - b.light).abs() < 2e-3 && (a.sensor - b.sensor).abs() < 2e-3;
+    let forth = near(ends[0], expected[0]) && near(ends[1], expected[1]);
+    let back = near(ends[1], expected[0]) && near(ends[0], expected[1]);
+    assert!(forth || back, "{ends:?}");
+}
+
+/// What of a leg cannot be measured is left out in words, and the rest of it flown.
+#[test]
+fn a_leg_is_cut_where_the_arms_cannot_go() {
+    let mut mechanics = mechanics();
+    mechanics.envelope.sensor.max = ArmAngle::from_deg(80.0);
+    let plan = plan(&job(SNAKE), &mechanics).unwrap();
+    let left = plan
+        .left_out
+        .iter()
+        .find(|left| left.what.starts_with("leg 3, sensor"));
+    let left = left.unwrap_or_else(|| panic!("{:?}", plan.left_out));
+    assert!(left.why.contains("80.0°"), "{left:?}");
+    for step in steps(&plan, Sweep::Leg(3)) {
+        assert!(step.pose().sensor.deg() <= 80.0);
+    }
+    mechanics.envelope.sensor.max = ArmAngle::from_deg(60.0);
+    mechanics.start = Some(Pose::from_deg(-45.0, 40.0));
+    let error = sweep::plan(&job(SNAKE), &mechanics).unwrap_err().to_string();
+    assert!(error.contains("leg[5]: nothing of it can be measured"), "{error}");
 }
