@@ -21,6 +21,7 @@ pub(crate) fn rows(grid: &Grid, judge: &Judge) -> Vec<GridRow> {
         planes_deg: String::new(),
         readings: 0,
         arc: 0,
+        motion: String::new(),
         budget_s: None,
         model,
         taken,
@@ -105,8 +106,6 @@ pub(crate) fn floor(
     reference: &[DVec3],
     material: &Material,
 ) -> Result<Vec<GridRow>, Error> {
-    let mut sets: Vec<&[f64]> = grid.fixed().map(|plan| plan.planes_deg.as_slice()).collect();
-    sets.dedup();
     let arc: Vec<Observation> = (0..DENSE)
         .filter_map(|i| {
             let theta = (REACH_DEG * i as f64 / (DENSE - 1) as f64).to_radians();
@@ -114,13 +113,16 @@ pub(crate) fn floor(
         })
         .collect();
     let mut rows = Vec::new();
-    for planes_deg in sets {
+    for planes_deg in grid.sets() {
         let planes: Vec<Vec<Observation>> = planes_deg.iter().map(|deg| dense(material, *deg)).collect();
         let plan = super::GridPlan {
             planes_deg: planes_deg.to_vec(),
+            snake: 0,
             readings: DENSE,
             distribution: pdv::Distribution::Capped,
             arc: DENSE,
+            mode: sweep::Mode::Step,
+            speed_deg_s: 0,
             budget_s: None,
         };
         for &model in grid.models.iter().filter(|&&model| plan.suits(model)) {
@@ -138,6 +140,7 @@ pub(crate) fn floor(
                 planes_deg: plan.planes(),
                 readings: DENSE,
                 arc: DENSE,
+                motion: String::new(),
                 budget_s: None,
                 model: model.name().to_owned(),
                 taken: plan.total(),

@@ -115,7 +115,11 @@ fn figure(outcome: &Outcome<'_>, title: &str, label: &'static str, of: impl Fn(&
 
 /// The front of the own models for each number of planes, with the floor that more time does not pass.
 fn by_planes(outcome: &Outcome<'_>, summary: &Summary) -> Figure {
-    let count = |planes: &str| planes.split(' ').count();
+    // A snake stands for itself.
+    let count = |planes: &str| match planes.starts_with("snake") {
+        true => 0,
+        false => planes.split(' ').count(),
+    };
     let own: Vec<&Point> = outcome
         .approaches
         .iter()
@@ -133,6 +137,7 @@ fn by_planes(outcome: &Outcome<'_>, summary: &Summary) -> Figure {
             .filter(|point| count(&point.planes_deg) == number);
         let (points, band) = steps(&front(some), |point| point.male);
         let name = match number {
+            0 => "snakes".to_owned(),
             1 => "1 plane".to_owned(),
             n => format!("{n} planes"),
         };
@@ -148,7 +153,10 @@ fn by_planes(outcome: &Outcome<'_>, summary: &Summary) -> Figure {
             .map(|line| line.male_median)
             .fold(f64::INFINITY, f64::min);
         let line = vec![(FROM_S / 2.0, floor), (TO_S, floor)];
-        curves.push(Curve::new("", colour, Mark::Dashed, line));
+        // Of a snake no floor was asked for.
+        if floor.is_finite() {
+            curves.push(Curve::new("", colour, Mark::Dashed, line));
+        }
     }
     let values = || {
         curves

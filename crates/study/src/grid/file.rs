@@ -2,7 +2,7 @@ use std::path::Path;
 
 use pdv::{Distribution, Draw};
 use serde::Deserialize;
-use sweep::Model;
+use sweep::{Mode, Model};
 
 use super::GridPlan;
 use crate::check::Check;
@@ -47,7 +47,25 @@ struct RawPlans {
     readings: Vec<usize>,
     arc: Vec<usize>,
     distribution: Distribution,
+    #[serde(default)]
+    snakes: Vec<usize>,
+    #[serde(default = "step")]
+    modes: Vec<Mode>,
+    #[serde(default = "usual")]
+    speeds_deg_s: Vec<u32>,
 }
+
+/// A study that says nothing of it has the arms stop for each reading,
+fn step() -> Vec<Mode> {
+    vec![Mode::Step]
+}
+
+/// and move as the built-in rig file has it.
+fn usual() -> Vec<u32> {
+    vec![USUAL_DEG_S]
+}
+
+const USUAL_DEG_S: u32 = 60;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -93,6 +111,19 @@ impl Grid {
         }
         check.list("plans.readings", &plans.readings, |n| n > 0, "1 … 2000")?;
         check.list("plans.arc", &plans.arc, |n| n <= 2000, "0 … 2000")?;
+        let known = |n| sweep::Leg::snake(n).is_some();
+        if !plans.snakes.iter().all(|&n| known(n)) {
+            return Err(check.range("plans.snakes", format!("{:?}", plans.snakes), "3, 6 and 10"));
+        }
+        if plans.modes.is_empty() {
+            return Err(check.range("plans.modes", "empty", "\"step\" and \"fly\""));
+        }
+        check.list(
+            "plans.speeds_deg_s",
+            &plans.speeds_deg_s,
+            |n| (10..=360).contains(&n),
+            "10 … 360",
+        )?;
         check.list("pca.readings", &raw.pca.readings, |n| n > 0, "1 …")?;
         let RawCompare {
             pairs,
@@ -105,29 +136,46 @@ impl Grid {
         check.number("compare.theta_max_deg", theta_max_deg, good, "above 0 … 90")?;
         let (readings, arcs) = (thin(plans.readings, quick), thin(plans.arc, quick));
         let mut cells = Vec::new();
-        for planes_deg in plans.planes_deg {
-            for &readings in &readings {
-                for &arc in &arcs {
-                    let plan = GridPlan {
-                        planes_deg: planes_deg.clone(),
-                        readings,
-                        distribution: plans.distribution,
-                        arc,
-                        budget_s: None,
-                    };
-                    plan.job()?;
-                    cells.push(plan);
+        let motions: Vec<(Mode, u32)> = plans
+            .modes
+            .iter()
+            .flat_map(|&mode| plans.speeds_deg_s.iter().map(move |&speed| (mode, speed)))
+            .collect();
+        for &(mode, speed_deg_s) in &motions {
+            let cell = |planes_deg: &[f64], snake, readings, arc| GridPlan {
+                planes_deg: planes_deg.to_vec(),
+                snake,
+                readings,
+                distribution: plans.distribution,
+                arc,
+                mode,
+                speed_deg_s,
+                budget_s: None,
+            };
+            for planes_deg in &plans.planes_deg {
+                for &readings in &readings {
+                    cells.extend(arcs.iter().map(|&arc| cell(planes_deg, 0, readings, arc)));
                 }
             }
+            // Where the arms stop for each reading a snake is only slower than planes.
+            if mode == Mode::Fly {
+                cells.extend(plans.snakes.iter().map(|&legs| cell(&[], legs, 0, 0)));
+            }
+        }
+        for cell in &cells {
+            cell.job()?;
         }
         if let Some(adaptive) = raw.adaptive {
             check.list("adaptive.budget_s", &adaptive.budget_s, |n| n > 0, "1 … 86400")?;
             for budget_s in thin(adaptive.budget_s, quick) {
                 let plan = GridPlan {
                     planes_deg: adaptive.planes_deg.clone(),
+                    snake: 0,
                     readings: adaptive.readings,
                     distribution: plans.distribution,
                     arc: adaptive.arc,
+                    mode: Mode::Step,
+                    speed_deg_s: USUAL_DEG_S,
                     budget_s: Some(budget_s),
                 };
                 plan.job()?;
@@ -146,6 +194,17 @@ impl Grid {
                 seed,
             },
         })
+    }
+
+    /// The sets of planes of which there is a floor, each once.
+    pub(crate) fn sets(&self) -> Vec<&[f64]> {
+        let mut sets: Vec<&[f64]> = Vec::new();
+        for plan in self.fixed().filter(|plan| plan.snake == 0) {
+            if !sets.contains(&plan.planes_deg.as_slice()) {
+                sets.push(&plan.planes_deg);
+            }
+        }
+        sets
     }
 
     /// The plans that are laid down before.

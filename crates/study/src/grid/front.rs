@@ -14,6 +14,8 @@ pub(crate) struct Point {
     pub(crate) readings: usize,
     /// Readings asked for of the arc.
     pub(crate) arc: usize,
+    /// How the arms moved.
+    pub(crate) motion: String,
     /// Rig seconds within which more was added.
     pub(crate) budget_s: Option<u32>,
     pub(crate) model: String,
@@ -35,6 +37,7 @@ pub(crate) struct Line {
     pub(crate) planes_deg: String,
     pub(crate) readings: usize,
     pub(crate) arc: usize,
+    pub(crate) motion: String,
     pub(crate) male_mean: f64,
     pub(crate) male_median: f64,
     pub(crate) male_p10: f64,
@@ -64,7 +67,14 @@ pub(crate) struct Approach {
 pub(crate) fn points(rows: &[GridRow], source: Source) -> Vec<Point> {
     let mut groups: BTreeMap<_, Vec<&GridRow>> = BTreeMap::new();
     for row in rows.iter().filter(|row| row.source == source) {
-        let key = (&row.model, &row.planes_deg, row.readings, row.arc, row.budget_s);
+        let key = (
+            &row.model,
+            &row.planes_deg,
+            row.readings,
+            row.arc,
+            &row.motion,
+            row.budget_s,
+        );
         groups.entry(key).or_default().push(row);
     }
     groups
@@ -75,6 +85,7 @@ pub(crate) fn points(rows: &[GridRow], source: Source) -> Vec<Point> {
                 planes_deg: first.planes_deg.clone(),
                 readings: first.readings,
                 arc: first.arc,
+                motion: first.motion.clone(),
                 budget_s: first.budget_s,
                 model: first.model.clone(),
                 rig_s: median(rows.iter().filter_map(|row| row.rig_s)),
@@ -150,6 +161,7 @@ impl Point {
             planes_deg: self.planes_deg.clone(),
             readings: self.readings,
             arc: self.arc,
+            motion: self.motion.clone(),
             male_mean: self.male.mean,
             male_median: self.male.median,
             male_p10: self.male.p10,
@@ -160,7 +172,7 @@ impl Point {
 
     /// Whether another point is of the same plan and model.
     pub(crate) fn same_plan(&self, other: &Self) -> bool {
-        let of = |point: &Self| (point.readings, point.arc, point.budget_s);
+        let of = |point: &Self| (point.readings, point.arc, point.motion.clone(), point.budget_s);
         self.planes_deg == other.planes_deg && self.model == other.model && of(self) == of(other)
     }
 
@@ -169,16 +181,21 @@ impl Point {
         row.source == Source::Rig
             && row.model == self.model
             && row.planes_deg == self.planes_deg
-            && (row.readings, row.arc, row.budget_s) == (self.readings, self.arc, self.budget_s)
+            && (row.readings, row.arc, &row.motion, row.budget_s)
+                == (self.readings, self.arc, &self.motion, self.budget_s)
     }
 
     /// What is done, in words.
     pub(crate) fn plan(&self) -> String {
+        if self.planes_deg.starts_with("snake") {
+            return format!("a {} legs, {}", self.planes_deg, self.motion);
+        }
         format!(
-            "{}, {} each, arc {}",
+            "{}, {} each, arc {}, {}",
             self.planes_deg.replace(' ', "° ") + "°",
             self.readings,
-            self.arc
+            self.arc,
+            self.motion
         )
     }
 }

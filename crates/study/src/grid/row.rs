@@ -25,6 +25,8 @@ pub struct GridRow {
     pub readings: usize,
     /// Readings asked for of the arc.
     pub arc: usize,
+    /// How the arms moved: "step at 60 °/s"; empty where there is no rig.
+    pub motion: String,
     /// Rig seconds within which more was added on the way.
     pub budget_s: Option<u32>,
     /// Which model.
@@ -47,8 +49,8 @@ pub struct GridRow {
     pub family: String,
 }
 
-/// What tells a row from every other: material, source, planes, readings, arc, budget and model.
-pub(crate) type Key = (String, Source, String, usize, usize, Option<u32>, String);
+/// What tells a row from every other: material, source, planes, readings, arc, motion, budget and model.
+pub(crate) type Key = (String, Source, String, usize, usize, String, Option<u32>, String);
 
 impl GridRow {
     /// What tells it from every other row.
@@ -59,6 +61,7 @@ impl GridRow {
             self.planes_deg.clone(),
             self.readings,
             self.arc,
+            self.motion.clone(),
             self.budget_s,
             self.model.clone(),
         )

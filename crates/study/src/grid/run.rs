@@ -6,7 +6,6 @@ use std::time::Instant;
 
 use glam::DVec3;
 use rayon::prelude::*;
-use rig::RigFile;
 
 use super::row::Key;
 use super::{Grid, GridPlan, GridRow, Source, baseline, document};
@@ -83,10 +82,13 @@ pub(crate) fn run(grid: &Grid, directory: &Path, progress: &Progress<'_>) -> Res
 
 /// What is not known yet, the dearest first, so that the cores end together.
 fn tasks<'a>(grid: &'a Grid, known: &HashSet<Key>) -> Vec<Task<'a>> {
-    let mut sets: Vec<&GridPlan> = grid.fixed().collect();
-    sets.dedup_by(|a, b| a.planes_deg == b.planes_deg);
-    let suited = |plan: &&GridPlan| grid.models.iter().filter(|&&model| plan.suits(model)).count();
-    let of_floor: usize = sets.iter().map(suited).sum();
+    let suited = |set: &[f64]| {
+        let plan = grid.fixed().find(|plan| plan.planes_deg == set);
+        plan.map_or(0, |plan| {
+            grid.models.iter().filter(|&&model| plan.suits(model)).count()
+        })
+    };
+    let of_floor: usize = grid.sets().into_iter().map(suited).sum();
     let mut tasks = Vec::new();
     for material in &grid.materials {
         let floors = known
@@ -104,6 +106,7 @@ fn tasks<'a>(grid: &'a Grid, known: &HashSet<Key>) -> Vec<Task<'a>> {
                     plan.planes(),
                     plan.readings,
                     plan.arc,
+                    plan.motion(),
                     plan.budget_s,
                     model.name().to_owned(),
                 ))
@@ -125,7 +128,7 @@ fn captured(
     material: &Material,
     plan: &GridPlan,
 ) -> Result<Vec<GridRow>, Error> {
-    let mut rig = RigFile::parse(RigFile::BUILT_IN, "the built-in rig file".as_ref())?;
+    let mut rig = plan.rig()?;
     let seed = seed(grid.draw.seed, &material.name, plan);
     rig.sim.insert("seed".to_owned(), seed.into());
     let measured = measure(&plan.job()?, &rig, material.brdf.clone())?;
@@ -136,7 +139,7 @@ fn captured(
             let made =
                 report::model(model, &measured.planes, &measured.arc).map_err(|source| Error::Model {
                     material: material.name.clone(),
-                    theta_r_deg: plan.planes_deg[0],
+                    theta_r_deg: plan.planes_deg.first().copied().unwrap_or_default(),
                     source,
                 })?;
             let fit_s = begun.elapsed().as_secs_f64();
@@ -147,6 +150,7 @@ fn captured(
                 planes_deg: plan.planes(),
                 readings: plan.readings,
                 arc: plan.arc,
+                motion: plan.motion(),
                 budget_s: plan.budget_s,
                 model: model.name().to_owned(),
                 taken: measured.readings,

@@ -107,6 +107,7 @@ fn captures(rows: &[GridRow]) -> usize {
                 &row.planes_deg,
                 row.readings,
                 row.arc,
+                &row.motion,
                 row.budget_s,
             )
         })
