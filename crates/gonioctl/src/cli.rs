@@ -7,6 +7,7 @@ use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use formats::FORMATS;
+use study::Shard;
 
 use crate::bound::Bound;
 use crate::junit::Junit;
@@ -22,6 +23,39 @@ use crate::{export, schema};
 pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,
+}
+
+/// Which study, and where.
+#[derive(Debug, Args)]
+pub(crate) struct StudyArguments {
+    /// The study file; the built-in config/studies/error-against-time.toml unless given.
+    pub(crate) study: Option<PathBuf>,
+    /// Measure the materials of these files and folders instead of those that the study file names: BRDF files of any
+    /// format that can be read, and CSV files of scattered readings.
+    ///
+    /// A CSV file has a header line and the zenith angles of light and sensor and the azimuth between them in degrees
+    /// (180 is the side of the mirror direction), then the reflectance in red, green and blue in 1/sr.
+    #[arg(long, value_name = "PATH", num_args = 1..)]
+    pub(crate) on: Vec<PathBuf>,
+    /// Of the materials of --on, measure every N-th.
+    #[arg(long, value_name = "N", default_value_t = 1, requires = "on")]
+    pub(crate) every: usize,
+    /// A small part of it, within a minute.
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Where rows, plots and the page are written; studies/NAME unless given.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// What is done with a study beside running it.
+#[derive(Debug, Subcommand)]
+pub(crate) enum StudyCommand {
+    /// Make the study of what its shards did, the same files as without shards. Name the study as for its shards.
+    Merge {
+        #[command(flatten)]
+        study: StudyArguments,
+    },
 }
 
 /// In the order of a working day.
@@ -251,25 +285,16 @@ pub(crate) enum Command {
     /// Error against run time, over materials, plans and models on the simulated rig; or what a study file asks for.
     ///
     /// A study that was interrupted goes on where it stopped.
+    #[command(args_conflicts_with_subcommands = true)]
     Study {
-        /// The study file; the built-in config/studies/error-against-time.toml unless given.
-        study: Option<PathBuf>,
-        /// Measure the materials of these files and folders instead of those that the study file names: BRDF files of any
-        /// format that can be read, and CSV files of scattered readings.
-        ///
-        /// A CSV file has a header line and the zenith angles of light and sensor and the azimuth between them in degrees
-        /// (180 is the side of the mirror direction), then the reflectance in red, green and blue in 1/sr.
-        #[arg(long, value_name = "PATH", num_args = 1..)]
-        on: Vec<PathBuf>,
-        /// Of the materials of --on, measure every N-th.
-        #[arg(long, value_name = "N", default_value_t = 1, requires = "on")]
-        every: usize,
-        /// A small part of it, within a minute.
-        #[arg(long)]
-        quick: bool,
-        /// Where rows, plots and the page are written; studies/NAME unless given.
-        #[arg(long, value_name = "DIR")]
-        out: Option<PathBuf>,
+        #[command(flatten)]
+        study: StudyArguments,
+        /// Do only part K of N, into a directory that all parts share; `study merge` makes the study of them. A part that is
+        /// done again does no harm.
+        #[arg(long, value_name = "K/N")]
+        shard: Option<Shard>,
+        #[command(subcommand)]
+        command: Option<StudyCommand>,
     },
     /// Let things go wrong in thousands of simulated captures: each must end true, or with a clear fault, safe and
     /// resumable.
@@ -461,5 +486,25 @@ mod tests {
         assert!(parse(&[]).is_err());
         assert!(parse(&["job.toml", "--resume", "runs/1"]).is_err());
         assert!(parse(&["--resume", "runs/1", "--out", "elsewhere"]).is_err());
+    }
+    #[test]
+    fn a_study_is_done_whole_in_shards_or_merged() {
+        let parse = |arguments: &[&str]| Cli::try_parse_from([&["gonioctl", "study"], arguments].concat());
+        let merges = |arguments: &[&str]| {
+            let command = parse(arguments).unwrap().command;
+            matches!(
+                command,
+                Command::Study {
+                    command: Some(StudyCommand::Merge { .. }),
+                    ..
+                }
+            )
+        };
+        assert!(!merges(&["study.toml", "--shard", "3/16", "--out", "shared"]));
+        assert!(merges(&["merge", "study.toml", "--quick", "--out", "shared"]));
+        assert!(merges(&["merge"]) && !merges(&[]) && !merges(&["./merge"]));
+        let error = parse(&["--shard", "4/3"]).unwrap_err().to_string();
+        assert!(error.contains("a shard is K/N with 1 ≤ K ≤ N"), "{error}");
+        assert!(parse(&["merge", "--shard", "1/3"]).is_err());
     }
 }

@@ -38,7 +38,7 @@ mod watch;
 use std::process::ExitCode;
 
 use arms::{Arm, ArmAngle};
-use cli::{ArmName, Cli, Command, DaemonArguments, Output};
+use cli::{ArmName, Cli, Command, DaemonArguments, Output, StudyCommand};
 use failure::Failure;
 use operator::OperatorCommand;
 use run::Task;
@@ -172,12 +172,10 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             });
         }
         Command::Study {
-            study,
-            on,
-            every,
-            quick,
-            out,
-        } => study::study(study.as_deref(), &on, every, quick, out)?,
+            command: Some(StudyCommand::Merge { study }),
+            ..
+        } => study::merge(&study)?,
+        Command::Study { study, shard, .. } => study::study(&study, shard)?,
         Command::Campaign {
             captures,
             seed,

@@ -67,6 +67,33 @@ pub enum Error {
         /// Which directory.
         directory: PathBuf,
     },
+    /// Somebody else is doing the same part of the study.
+    #[error("{path} is being written by another program; wait until it has ended, or end it")]
+    InUse {
+        /// Which rows.
+        path: PathBuf,
+    },
+    /// What a shard is called is none.
+    #[error("a shard is K/N with 1 ≤ K ≤ N ≤ {most}, such as 3/16, and not {given:?}")]
+    Shard {
+        /// What was given.
+        given: String,
+        /// The most shards.
+        most: u32,
+    },
+    /// Not all of a study has been done.
+    #[error(
+        "{missing} of {of} tasks of the study are not done in {directory}: run the shards again that have not ended, or the study \
+         without --shard, which does the rest"
+    )]
+    Unfinished {
+        /// Tasks that are missing.
+        missing: usize,
+        /// All tasks.
+        of: usize,
+        /// Of which directory.
+        directory: PathBuf,
+    },
     /// A plot could not be drawn.
     #[error("cannot draw \"{title}\": {why}")]
     Plot {

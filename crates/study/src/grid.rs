@@ -10,10 +10,13 @@ mod pca;
 mod plan;
 mod row;
 mod run;
+mod shard;
 mod summary;
+mod task;
 mod words;
 
 pub use file::Grid;
 pub use plan::GridPlan;
 pub use row::{GridRow, Source};
-pub(crate) use run::run;
+pub(crate) use run::{merge, run, run_shard};
+pub use shard::Shard;

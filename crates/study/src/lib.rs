@@ -25,7 +25,7 @@ mod write;
 
 pub use campaign::{Campaign, Campaigned, Carried, Script, WireFault, Wrong};
 pub use error::Error;
-pub use grid::{Grid, GridPlan, GridRow, Source};
+pub use grid::{Grid, GridPlan, GridRow, Shard, Source};
 pub use judge::Score;
 pub use material::Material;
 pub use measure::{Capture, Measured, measure};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use crate::check::Check;
-use crate::{Error, Evaluation, Grid, Material, grid, paper, write};
+use crate::{Error, Evaluation, Grid, Material, Shard, grid, paper, write};
 
 /// Told how much of the work is done, and of how much; from any thread.
 pub type Progress<'a> = dyn Fn(u64, u64) + Sync + 'a;
@@ -121,32 +121,73 @@ impl Study {
     }
 
     /// Runs it into a directory, which is made where it is missing, and says what it found. A study that was
-    /// interrupted goes on.
+    /// interrupted goes on, and what shards have done is not done again.
     ///
     /// # Errors
-    /// The directory holds another study or cannot be written; a material cannot be measured or reconstructed.
+    /// The directory holds another study or cannot be written; somebody else runs the study there; a material cannot be
+    /// measured or reconstructed.
     pub fn run(&self, directory: &Path, progress: &Progress<'_>) -> Result<String, Error> {
+        self.claim(directory)?;
+        match &self.what {
+            What::Grid(study) => grid::run(study, directory, progress),
+            What::Evaluation(study) => paper::run(study, directory, progress),
+        }
+    }
+
+    /// Does one of several parts of it into a directory that all of them share, and says what it did. A part that was
+    /// interrupted goes on; one that is done again has nothing left to do.
+    ///
+    /// # Errors
+    /// As for [`Study::run`], and a study of another kind than error against run time.
+    pub fn run_shard(
+        &self,
+        directory: &Path,
+        shard: Shard,
+        progress: &Progress<'_>,
+    ) -> Result<String, Error> {
+        let grid = self.grid("--shard")?;
+        self.claim(directory)?;
+        grid::run_shard(grid, directory, shard, progress)
+    }
+
+    /// Makes the study of what its parts did, byte for byte what [`Study::run`] makes, and says what it found.
+    ///
+    /// # Errors
+    /// Something of it is not done; the directory holds another study or cannot be written; a study of another kind than
+    /// error against run time.
+    pub fn merge(&self, directory: &Path) -> Result<String, Error> {
+        let grid = self.grid("merge")?;
+        self.claim(directory)?;
+        grid::merge(grid, directory)
+    }
+
+    fn grid(&self, key: &'static str) -> Result<&Grid, Error> {
+        match &self.what {
+            What::Grid(grid) => Ok(grid),
+            What::Evaluation(_) => Err(Error::Range {
+                file: "the command line".to_owned(),
+                key,
+                value: "given".to_owned(),
+                allowed: "a study of error against run time",
+            }),
+        }
+    }
+
+    /// Makes a directory one of this study, or sees that it is.
+    fn claim(&self, directory: &Path) -> Result<(), Error> {
         let io = |what, path: &Path| {
             let path = path.to_owned();
             move |source| Error::Io { what, path, source }
         };
         fs::create_dir_all(directory).map_err(io("make the directory", directory))?;
         let copy = directory.join("study.toml");
-        match fs::read_to_string(&copy) {
-            Ok(text) if text == self.text => {}
-            Ok(_) => {
-                return Err(Error::OtherStudy {
-                    directory: directory.to_owned(),
-                });
-            }
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                write::file(directory, "study.toml", self.text.as_bytes())?;
-            }
-            Err(error) => return Err(io("read", &copy)(error)),
-        }
-        match &self.what {
-            What::Grid(study) => grid::run(study, directory, progress),
-            What::Evaluation(study) => paper::run(study, directory, progress),
+        // Of shards that begin together, one writes it.
+        write::new_file(directory, "study.toml", self.text.as_bytes())?;
+        match fs::read_to_string(&copy).map_err(io("read", &copy))? {
+            text if text == self.text => Ok(()),
+            _ => Err(Error::OtherStudy {
+                directory: directory.to_owned(),
+            }),
         }
     }
 }

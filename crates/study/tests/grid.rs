@@ -1,9 +1,11 @@
 //! A small study of error against run time, whole and interrupted.
 
+use std::collections::BTreeMap;
 use std::fs;
+use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 
-use study::Study;
+use study::{Shard, Study};
 
 const TEXT: &str = "
 study = \"error-against-time\"
@@ -16,14 +18,24 @@ pca = { readings = [2] }
 compare = { pairs = 500, theta_max_deg = 80.0, seed = 3 }
 ";
 
-/// Rows without the seconds that this machine took.
 fn rows(directory: &Path) -> Vec<Vec<String>> {
     let text = fs::read_to_string(directory.join("study.csv")).expect("the study wrote it");
-    let cells = |line: &str| -> Vec<String> {
-        let cells = line.split(',').map(str::to_owned).enumerate();
-        cells.filter(|(i, _)| *i != 11).map(|(_, cell)| cell).collect()
-    };
+    let cells = |line: &str| line.split(',').map(str::to_owned).collect();
     text.lines().map(cells).collect()
+}
+
+/// Everything that a study says, byte for byte: all files but the ledgers, which have the seconds of this machine.
+fn said(directory: &Path) -> BTreeMap<String, Vec<u8>> {
+    let files = fs::read_dir(directory).expect("the study made it").map(|entry| {
+        let path = entry.expect("it can be listed").path();
+        let name = path
+            .file_name()
+            .expect("a file has a name")
+            .to_string_lossy()
+            .into_owned();
+        (name, fs::read(path).expect("it can be read"))
+    });
+    files.filter(|(name, _)| !name.starts_with("rows")).collect()
 }
 
 #[test]
@@ -53,12 +65,64 @@ fn an_interrupted_study_ends_as_a_whole_one_does() {
     let page = fs::read_to_string(directory.path().join("index.html")).unwrap();
     assert!(!page.contains("src=\"http") && !page.contains("<script") && page.contains("<svg"));
 
+    let all = said(directory.path());
     let csv = directory.path().join("study.csv");
-    let text = fs::read_to_string(&csv).unwrap();
+    let ledger = directory.path().join("rows.csv");
+    let text = fs::read_to_string(&ledger).unwrap();
+    fs::remove_file(&csv).unwrap();
     // As if it had been killed in the midst of a line.
-    fs::write(&csv, &text[..text.len() / 2]).unwrap();
+    fs::write(&ledger, &text[..text.len() / 2]).unwrap();
     study.run(directory.path(), &|_, _| ()).unwrap();
-    assert_eq!(rows(directory.path()), whole);
+    assert!(said(directory.path()) == all);
+
+    // An older version kept what it had done in study.csv.
+    fs::remove_file(&ledger).unwrap();
+    fs::write(&csv, &text).unwrap();
+    let begun = |_, of| assert_eq!(of, 0, "nothing is done again");
+    study.run(directory.path(), &begun).unwrap();
+    assert!(said(directory.path()) == all);
+
+    // In shards, one of them twice and one killed in the midst of a line: the same files.
+    let shared = tempfile::tempdir().unwrap();
+    let shard = |name: &str| {
+        let shard: Shard = name.parse().unwrap();
+        study.run_shard(shared.path(), shard, &|_, _| ()).unwrap()
+    };
+    let words = shard("2/3");
+    assert!(
+        words.contains("shard 2/3 has 3 of 9 tasks, of which 3 were done now"),
+        "{words}"
+    );
+    let error = study.merge(shared.path()).unwrap_err().to_string();
+    assert!(
+        error.contains("6 of 9 tasks") && error.contains("run the shards again"),
+        "{error}"
+    );
+    // Whoever does another part may be another user.
+    let mode = |name: &str| {
+        fs::metadata(shared.path().join(name))
+            .unwrap()
+            .permissions()
+            .mode()
+    };
+    assert_eq!(mode("study.toml"), mode("rows-2-of-3.csv"));
+    let first = shard("1/3");
+    assert!(first.contains("3 were done now"), "{first}");
+    assert!(shard("1/3").contains("of which 0 were done now"));
+    let ledger = shared.path().join("rows-1-of-3.csv");
+    let text = fs::read_to_string(&ledger).unwrap();
+    fs::write(&ledger, &text[..text.len() - 20]).unwrap();
+    shard("3/3");
+    let error = study.merge(shared.path()).unwrap_err().to_string();
+    assert!(error.contains("1 of 9 tasks"), "{error}");
+    assert!(shard("1/3").contains("of which 1 were done now"));
+    study.merge(shared.path()).unwrap();
+    assert!(said(shared.path()) == all, "the merged study is another");
+    // Whatever is done again afterwards changes nothing.
+    shard("2/3");
+    study.merge(shared.path()).unwrap();
+    study.run(shared.path(), &begun).unwrap();
+    assert!(said(shared.path()) == all);
 
     let other = Study::parse(&TEXT.replace("seed = 3", "seed = 4"), "study.toml", false).unwrap();
     let error = other.run(directory.path(), &|_, _| ()).unwrap_err().to_string();
@@ -148,7 +212,7 @@ fn a_study_is_done_on_the_materials_of_a_folder() {
     let floor = of("measured")
         .into_iter()
         .find(|row| row[1] == "floor" && row[7] == "reciprocal");
-    let male: f64 = floor.expect("there is a floor")[10].parse().unwrap();
+    let male: f64 = floor.expect("there is a floor")[11].parse().unwrap();
     assert!(male < 0.01, "{male}");
     // Without another family there is nothing to learn from.
     assert!(!words.contains("PCA"), "{words}");

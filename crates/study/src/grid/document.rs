@@ -18,7 +18,8 @@ pub(crate) fn write(grid: &Grid, rows: &[GridRow], directory: &Path) -> Result<S
         write::file(directory, name, &text)
     };
     write::file(directory, "families.csv", &families_csv(&summary.families)?)?;
-    let text = ledger::text(rows, true).map_err(Error::Write)?;
+    // The seconds of this machine stay in the ledgers: a study that is done again, or in shards, is the same files.
+    let text = ledger::text_without(rows, "fit_s").map_err(Error::Write)?;
     write::file(directory, "study.csv", &text)?;
     csv("front.csv", &outcome.lines())?;
     csv("floor.csv", &summary.floors)?;
@@ -53,7 +54,6 @@ fn table(lines: &[Line]) -> Vec<Vec<String>> {
         "arc",
         "motion",
         "rig s",
-        "compute s",
         "MALE mean",
         "median",
         "10 %",
@@ -73,7 +73,6 @@ fn table(lines: &[Line]) -> Vec<Vec<String>> {
             line.arc.to_string(),
             line.motion.clone(),
             number(line.rig_s, 1),
-            number(line.fit_s, 3),
             number(line.male_mean, 5),
             number(line.male_median, 5),
             number(line.male_p10, 5),

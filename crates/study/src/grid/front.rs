@@ -21,8 +21,6 @@ pub(crate) struct Point {
     pub(crate) model: String,
     /// Median of the seconds that the rig took; NaN where there was none.
     pub(crate) rig_s: f64,
-    /// Median of the seconds that making the model took.
-    pub(crate) fit_s: f64,
     pub(crate) male: Band,
     /// Over the materials' median relative errors.
     pub(crate) median_rel: Band,
@@ -33,7 +31,6 @@ pub(crate) struct Point {
 pub(crate) struct Line {
     pub(crate) approach: String,
     pub(crate) rig_s: f64,
-    pub(crate) fit_s: f64,
     pub(crate) planes_deg: String,
     pub(crate) readings: usize,
     pub(crate) arc: usize,
@@ -89,7 +86,6 @@ pub(crate) fn points(rows: &[GridRow], source: Source) -> Vec<Point> {
                 budget_s: first.budget_s,
                 model: first.model.clone(),
                 rig_s: median(rows.iter().filter_map(|row| row.rig_s)),
-                fit_s: median(rows.iter().filter_map(|row| row.fit_s)),
                 male: Band::of(rows.iter().map(|row| row.male)),
                 median_rel: Band::of(rows.iter().map(|row| row.median_rel)),
             }
@@ -157,7 +153,6 @@ impl Point {
         Line {
             approach: approach.to_owned(),
             rig_s: self.rig_s,
-            fit_s: self.fit_s,
             planes_deg: self.planes_deg.clone(),
             readings: self.readings,
             arc: self.arc,

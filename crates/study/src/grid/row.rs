@@ -12,7 +12,7 @@ pub enum Source {
     Baseline,
 }
 
-/// One reconstruction: a line of study.csv. What does not exist is empty.
+/// One reconstruction: a line of rows.csv, and but for `fit_s` of study.csv. What does not exist is empty.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GridRow {
     /// Which material.
@@ -37,7 +37,7 @@ pub struct GridRow {
     pub exposures: usize,
     /// Seconds that the simulated rig took.
     pub rig_s: Option<f64>,
-    /// Seconds of one core that making the model took.
+    /// Seconds of one core that making the model took; they differ each time, so that nothing is made of them.
     pub fit_s: Option<f64>,
     /// See [`crate::Score`].
     pub male: f64,

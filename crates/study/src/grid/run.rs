@@ -1,4 +1,3 @@
-use std::collections::HashSet;
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -7,117 +6,124 @@ use std::time::Instant;
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::row::Key;
+use super::shard::{self, Shard, WHOLE};
+use super::task::{Known, Task};
 use super::{Grid, GridPlan, GridRow, Source, baseline, document};
 use crate::judge::Judge;
-use crate::ledger::Ledger;
+use crate::ledger::{self, Ledger};
 use crate::{Error, Material, Progress, measure};
 
-/// What a capture costs beside its readings, in readings: planning, dark readings, the runtime.
-const CAPTURE_COST: u64 = 60;
-/// What the floor and the baselines of one material cost, in readings.
-const FLOOR_COST: u64 = 5000;
-
-/// One thing to do, on one core.
-enum Task<'a> {
-    Capture(&'a Material, &'a GridPlan),
-    Floor(&'a Material),
-}
-
-impl Task<'_> {
-    fn material(&self) -> &Material {
-        match self {
-            Self::Capture(material, _) | Self::Floor(material) => material,
-        }
-    }
-
-    fn cost(&self) -> u64 {
-        match self {
-            Self::Capture(_, plan) => CAPTURE_COST + plan.total() as u64,
-            Self::Floor(_) => FLOOR_COST,
-        }
-    }
-}
-
-/// Runs a grid into a directory: study.csv grows as it goes and is where an interrupted study goes on; the fronts,
-/// plots and the page follow at its end. Returns what it found, in words.
+/// Runs a grid into a directory: rows.csv grows as it goes and is where an interrupted study goes on; what shards have done
+/// there is not done again. Rows in their order, fronts, plots and the page follow at its end. Returns what it found, in
+/// words.
 ///
 /// # Errors
-/// The directory holds another study or cannot be written; a capture or a model fails.
+/// The directory cannot be written, or somebody else runs the study there; a capture or a model fails.
 pub(crate) fn run(grid: &Grid, directory: &Path, progress: &Progress<'_>) -> Result<String, Error> {
+    let ledger = Ledger::<GridRow>::open(&directory.join(WHOLE))?;
+    let known = Known::of(&rows(directory)?);
+    let tasks = Task::all(grid);
+    let open: Vec<&Task<'_>> = tasks.iter().filter(|task| !known.has(grid, task)).collect();
+    carry_out(grid, &open, ledger, progress)?;
+    document::write(grid, &in_order(rows(directory)?), directory)
+}
+
+/// Does a shard's part of a grid, as far as it is not done yet, into a ledger of its own. Returns in words what it did.
+///
+/// # Errors
+/// As for [`run`].
+pub(crate) fn run_shard(
+    grid: &Grid,
+    directory: &Path,
+    shard: Shard,
+    progress: &Progress<'_>,
+) -> Result<String, Error> {
+    let ledger = Ledger::<GridRow>::open(&directory.join(shard.ledger()))?;
+    let known = Known::of(&rows(directory)?);
+    let tasks = Task::all(grid);
+    let own: Vec<&Task<'_>> = shard.part(&tasks).collect();
+    let open: Vec<&Task<'_>> = own
+        .iter()
+        .copied()
+        .filter(|task| !known.has(grid, task))
+        .collect();
+    let begun = Instant::now();
+    carry_out(grid, &open, ledger, progress)?;
+    Ok(format!(
+        "shard {shard} has {} of {} tasks, of which {} were done now, in {:.1} s; `gonioctl study merge` makes the study of all",
+        own.len(),
+        tasks.len(),
+        open.len(),
+        begun.elapsed().as_secs_f64(),
+    ))
+}
+
+/// Makes the study of what its shards did: the same files as without shards.
+///
+/// # Errors
+/// Something has not been done yet; the directory cannot be read or written.
+pub(crate) fn merge(grid: &Grid, directory: &Path) -> Result<String, Error> {
+    let rows = rows(directory)?;
+    let known = Known::of(&rows);
+    let tasks = Task::all(grid);
+    let missing = tasks.iter().filter(|task| !known.has(grid, task)).count();
+    if missing > 0 {
+        return Err(Error::Unfinished {
+            missing,
+            of: tasks.len(),
+            directory: directory.to_owned(),
+        });
+    }
+    document::write(grid, &in_order(rows), directory)
+}
+
+/// Does tasks on all cores, the dearest first.
+fn carry_out(
+    grid: &Grid,
+    tasks: &[&Task<'_>],
+    ledger: Ledger<GridRow>,
+    progress: &Progress<'_>,
+) -> Result<(), Error> {
     let judge = Judge::new(&grid.draw);
-    let ledger = Mutex::new(Ledger::<GridRow>::open(&directory.join("study.csv"))?);
-    let known: Vec<GridRow> = ledger.lock().expect("nobody panics with it").rows().to_vec();
-    let known: HashSet<_> = known.iter().map(GridRow::key).collect();
-    let tasks = tasks(grid, &known);
-    let total: u64 = tasks.iter().map(Task::cost).sum();
+    let ledger = Mutex::new(ledger);
+    let total: u64 = tasks.iter().map(|task| task.cost(grid)).sum();
     let done = AtomicU64::new(0);
     progress(0, total);
     tasks.par_iter().try_for_each(|task| -> Result<(), Error> {
-        let material = task.material();
-        let (judge, reference) = judge.of(material, grid.draw.theta_max);
         let rows = match task {
-            Task::Capture(_, plan) => captured(grid, &judge, &reference, material, plan)?,
-            Task::Floor(_) => baseline::floor(grid, &judge, &reference, material)?,
+            Task::Baselines => baseline::rows(grid, &judge),
+            Task::Capture(material, plan) => {
+                let (judge, reference) = judge.of(material, grid.draw.theta_max);
+                captured(grid, &judge, &reference, material, plan)?
+            }
+            Task::Floor(material) => {
+                let (judge, reference) = judge.of(material, grid.draw.theta_max);
+                baseline::floor(grid, &judge, &reference, material)?
+            }
         };
         ledger.lock().expect("nobody panics with it").append(&rows)?;
-        progress(
-            done.fetch_add(task.cost(), Ordering::Relaxed) + task.cost(),
-            total,
-        );
+        let cost = task.cost(grid);
+        progress(done.fetch_add(cost, Ordering::Relaxed) + cost, total);
         Ok(())
-    })?;
-    let mut ledger = ledger.into_inner().expect("nobody panics with it");
-    let baselines = baseline::count(grid);
-    if known.iter().filter(|key| key.1 == Source::Baseline).count() < baselines {
-        ledger.append(&baseline::rows(grid, &judge))?;
+    })
+}
+
+/// All rows in a directory, whoever made them: those of the whole study, where an older version kept what it had done, then
+/// those of all ledgers.
+fn rows(directory: &Path) -> Result<Vec<GridRow>, Error> {
+    let mut rows = ledger::read(&directory.join("study.csv"))?;
+    for path in shard::ledgers(directory)? {
+        rows.extend(ledger::read(&path)?);
     }
-    let mut rows = ledger.rows().to_vec();
-    // Cores finish in any order; the same study is the same file.
+    Ok(rows)
+}
+
+/// Rows as they stand in study.csv: cores and shards finish in any order, and the same study is the same file.
+fn in_order(mut rows: Vec<GridRow>) -> Vec<GridRow> {
     rows.sort_by_cached_key(GridRow::key);
     // Of what was interrupted half-way, some rows were made again.
     rows.dedup_by(|a, b| a.key() == b.key());
-    document::write(grid, &rows, directory)
-}
-
-/// What is not known yet, the dearest first, so that the cores end together.
-fn tasks<'a>(grid: &'a Grid, known: &HashSet<Key>) -> Vec<Task<'a>> {
-    let suited = |set: &[f64]| {
-        let plan = grid.fixed().find(|plan| plan.planes_deg == set);
-        plan.map_or(0, |plan| {
-            grid.models.iter().filter(|&&model| plan.suits(model)).count()
-        })
-    };
-    let of_floor: usize = grid.sets().into_iter().map(suited).sum();
-    let mut tasks = Vec::new();
-    for material in &grid.materials {
-        let floors = known
-            .iter()
-            .filter(|key| key.0 == material.name && key.1 == Source::Floor);
-        if floors.count() < of_floor {
-            tasks.push(Task::Floor(material));
-        }
-        for plan in &grid.plans {
-            let mut models = grid.models.iter().filter(|&&model| plan.suits(model));
-            let whole = models.all(|model| {
-                known.contains(&(
-                    material.name.clone(),
-                    Source::Rig,
-                    plan.planes(),
-                    plan.readings,
-                    plan.arc,
-                    plan.motion(),
-                    plan.budget_s,
-                    model.name().to_owned(),
-                ))
-            });
-            if !whole {
-                tasks.push(Task::Capture(material, plan));
-            }
-        }
-    }
-    tasks.sort_by_key(|task| std::cmp::Reverse(task.cost()));
-    tasks
+    rows
 }
 
 /// One capture and every model that suits it.
