@@ -5,6 +5,7 @@ use std::time::Duration;
 use arms::{Arm, ArmAngle, Pose};
 use brdf::Brdf;
 use glam::DVec3;
+use pdv::Placement;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rig::{Axis, RigFile};
@@ -108,11 +109,17 @@ impl Bench {
             measuring: None,
             measured: 0,
         };
+        bench.place(settings.place);
         bench.set_clock(settings.clock);
         for fault in settings.faults {
             bench.schedule(fault);
         }
         Ok(bench)
+    }
+
+    /// Puts the specimen on a wedge, or turns it, as somebody does who stands at the rig.
+    pub fn place(&mut self, place: Placement) {
+        self.optics.place(place);
     }
 
     /// Simulated time since power-on.

@@ -3,11 +3,14 @@ use std::sync::Arc;
 use arms::{ArmAngle, Envelope, Pose};
 use brdf::Brdf;
 use glam::DVec3;
+use pdv::Placement;
 use rig::Filling;
 
 /// What light does between lamp and photometer: reflectance averaged over both apertures, cosine, occlusion.
 pub(crate) struct Optics {
     specimen: Arc<dyn Brdf>,
+    /// How it lies on the stage; the arms do not know of it.
+    place: Placement,
     envelope: Envelope,
     filling: Filling,
     /// Offsets within the source's and the detector's aperture, as tangents of angles.
@@ -35,11 +38,26 @@ impl Optics {
         let [source, detector] = apertures.map(disc);
         Self {
             specimen,
+            place: Placement::FLAT,
             envelope,
             filling,
             source,
             detector,
         }
+    }
+
+    /// Puts the specimen on a wedge, or turns it.
+    pub(crate) fn place(&mut self, place: Placement) {
+        self.place = place;
+    }
+
+    /// A direction of the rig's frame in that of the specimen.
+    fn seen(&self, direction: DVec3) -> DVec3 {
+        // Most specimens lie flat, and this is asked for often.
+        if self.place == Placement::FLAT {
+            return direction;
+        }
+        self.place.seen(direction)
     }
 
     /// f·cos in sr⁻¹: mean reflectance over the apertures times the cosine of the filling; 0 where one arm shadows
@@ -49,13 +67,14 @@ impl Optics {
             return DVec3::ZERO;
         }
         let cos = match self.filling {
-            Filling::Over => pose.incident().z,
-            Filling::Under => pose.exitant().z,
+            Filling::Over => self.seen(pose.incident()).z,
+            Filling::Under => self.seen(pose.exitant()).z,
         };
-        let exitant: Vec<DVec3> = self.detector.iter().map(|&at| within(pose.sensor, at)).collect();
+        let exitant = self.detector.iter().map(|&at| within(pose.sensor, at));
+        let exitant: Vec<DVec3> = exitant.map(|direction| self.seen(direction)).collect();
         let mut sum = DVec3::ZERO;
         for &at in &self.source {
-            let incident = within(pose.light, at);
+            let incident = self.seen(within(pose.light, at));
             for &exitant in &exitant {
                 sum += self.specimen.eval(incident, exitant);
             }
@@ -154,6 +173,32 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn on_a_wedge_the_specimen_is_seen_from_where_the_arms_really_stand() {
+        let place = Placement {
+            azimuth: 0.4,
+            tilt: 0.5,
+            axis: 0.2,
+        };
+        let gold = brdf::specimen("gold-paint").unwrap();
+        let pose = Pose::from_deg(-60.0, 20.0);
+        let (incident, exitant) = place.pair(pose.light.rad(), pose.sensor.rad()).unwrap();
+        for (filling, cos) in [(Filling::Over, incident.z), (Filling::Under, exitant.z)] {
+            let mut optics = optics("gold-paint", filling, [0.0, 0.0]);
+            optics.place(place);
+            let expected = gold.eval(incident, exitant) * cos;
+            assert!((optics.signal(pose) - expected).length() < 1e-12, "{filling:?}");
+        }
+        // Beneath it there is no light.
+        let mut optics = optics("lambert:0.5", Filling::Over, [0.0, 0.0]);
+        optics.place(Placement {
+            tilt: 0.6,
+            axis: 90f64.to_radians(),
+            ..Placement::FLAT
+        });
+        assert_eq!(optics.signal(Pose::from_deg(-20.0, 80.0)), DVec3::ZERO);
     }
 
     #[test]

@@ -8,7 +8,8 @@ use crate::{Fault, Server, Settings, SimError, WireSettings};
 /// Keys are those of the `[sim]` table that may change while it runs; a table keeps what the line does not name.
 /// `fault = { device = "sensor", what = "overload" }` happens at once, or at its `at_s`; `plugged = false` pulls the
 /// adapter's plug, `plugged = true` puts it in again, perhaps under another name. `sim.jitter_counts = 2` and
-/// `sim.light.static_error_counts = 5` change the mechanics of both arms, or of one.
+/// `sim.light.static_error_counts = 5` change the mechanics of both arms, or of one. `sim.place.tilt_deg = 20` puts the
+/// specimen on a wedge.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Order {
@@ -51,6 +52,9 @@ impl Order {
         if settings.mechanics != before.mechanics {
             server.bench(|bench| bench.set_mechanics(settings.mechanics));
         }
+        if settings.place != before.place {
+            server.bench(|bench| bench.place(settings.place));
+        }
         server.faults(|faults| *faults = wire.faults);
         *rig = changed;
         if let Some(fault) = self.fault {
@@ -89,6 +93,7 @@ fn only_what_may_change(changed: &Settings, before: &Settings) -> Result<(), Sim
     let rest = |settings: &Settings| Settings {
         mechanics: before.mechanics,
         mishaps: before.mishaps.clone(),
+        place: before.place,
         ..settings.clone()
     };
     if rest(changed) == rest(before) {
@@ -96,8 +101,8 @@ fn only_what_may_change(changed: &Settings, before: &Settings) -> Result<(), Sim
     }
     Err(SimError::Form {
         why:
-            "only the mechanics of the arms can change while the simulator runs, such as sim.jitter_counts; \
-              everything else holds from power-on, so change the rig file and start it again"
+            "only the mechanics of the arms can change while the simulator runs, such as sim.jitter_counts, and how the \
+              specimen lies (sim.place); everything else holds from power-on, so change the rig file and start it again"
                 .to_owned(),
     })
 }
@@ -169,6 +174,19 @@ mod tests {
     }
 
     #[test]
+    fn somebody_puts_the_specimen_on_a_wedge_while_it_runs() {
+        let mut rig = RigFile::default();
+        let mut server = Server::start(&rig).unwrap();
+        obey("sim.place.tilt_deg = 20", &mut rig, &mut server).unwrap();
+        obey("sim.place.axis_deg = 90", &mut rig, &mut server).unwrap();
+        let place = Settings::new(&rig).unwrap().place;
+        let [tilt, axis] = [place.tilt, place.axis].map(f64::to_degrees);
+        assert!((tilt - 20.0).abs() < 1e-12 && (axis - 90.0).abs() < 1e-12, "{place:?}");
+        assert!(obey("sim.place.tilt_deg = 61", &mut rig, &mut server).is_err());
+        assert_eq!(Settings::new(&rig).unwrap().place, place);
+    }
+
+    #[test]
     fn a_fault_without_a_time_happens_at_once() {
         let mut rig = RigFile::default();
         let mut server = Server::start(&rig).unwrap();
@@ -210,6 +228,7 @@ mod tests {
             "sim.jitter_counts = nan",
             "sim.light.ring = { counts = 20 }",
             "sim.seed = 7",
+            "sim.place.tilt_deg = 70",
             "fault = { device = 'light', what = { mechanics = { stiction_counts = 101 } } }",
             "fault = { device = 'light', what = { turn_deg = 181 } }",
         ] {

@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use arms::Pose;
+use pdv::Placement;
 use rig::RigFile;
 use serde::Deserialize;
 
@@ -25,6 +26,8 @@ pub enum Clock {
 pub struct Settings {
     /// What lies on the stage, in the words of [`brdf::specimen`].
     pub specimen: String,
+    /// How it lies there.
+    pub place: Placement,
     /// Seed of every random effect.
     pub seed: u64,
     /// How time passes behind the wire.
@@ -63,6 +66,8 @@ struct Raw {
     #[serde(default)]
     mishaps: Rates,
     specimen: Option<String>,
+    #[serde(default)]
+    place: RawPlace,
     seed: Option<i64>,
     clock: Option<Clock>,
     imperfections: Option<Preset>,
@@ -110,6 +115,25 @@ struct Raw {
     sensor: MechanicsKeys,
 }
 
+/// How the specimen lies on the stage.
+#[derive(Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct RawPlace {
+    azimuth_deg: Option<f64>,
+    tilt_deg: Option<f64>,
+    axis_deg: Option<f64>,
+}
+
+impl RawPlace {
+    fn check(&self) -> Result<Placement, SimError> {
+        Ok(Placement {
+            azimuth: within("place.azimuth_deg", self.azimuth_deg, 0.0, -180.0..=180.0)?.to_radians(),
+            tilt: within("place.tilt_deg", self.tilt_deg, 0.0, 0.0..=60.0)?.to_radians(),
+            axis: within("place.axis_deg", self.axis_deg, 0.0, -180.0..=180.0)?.to_radians(),
+        })
+    }
+}
+
 impl Settings {
     /// Checks the `[sim]` table of a rig file.
     ///
@@ -142,6 +166,7 @@ impl Settings {
             imperfections: imperfections(&raw)?,
             mechanics: mechanics(&raw),
             clock: raw.clock.unwrap_or(Clock::Wire),
+            place: raw.place.check()?,
             specimen: raw.specimen.unwrap_or_else(|| "gold-paint".to_owned()),
             start,
             faults: raw.fault,
@@ -322,6 +347,11 @@ mod tests {
             error("lamp_drift = nan"),
             "sim.lamp_drift is NaN, allowed: 0 … 0.5"
         );
+        assert_eq!(
+            error("place = { tilt_deg = 61.0 }"),
+            "sim.place.tilt_deg is 61, allowed: 0 … 60"
+        );
+        assert!(error("place.lean_deg = 1.0").contains("`lean_deg`"));
         assert_eq!(
             error("boot_ms = 1e9"),
             "sim.boot_ms is 1000000000, allowed: 0 … 10000"

@@ -16,7 +16,7 @@ const EDGES: [(&str, &[&str]); 17] = [
     ("rig", &["arms", "config"]),
     ("capture", &["sweep", "rig", "pdv"]),
     ("report", &["capture", "pdv", "formats"]),
-    ("firmware-sim", &["brdf", "arms", "rig", "terminal"]),
+    ("firmware-sim", &["pdv", "arms", "rig", "terminal"]),
     ("study", &["report", "firmware-sim"]),
     ("session", &["report", "firmware-sim"]),
     ("api", &[]),

@@ -53,12 +53,27 @@ impl Placement {
         self.of_rig().row(2)
     }
 
+    /// A direction of the rig's frame in the frame of the specimen.
+    ///
+    /// ```
+    /// use glam::DVec3;
+    /// use pdv::Placement;
+    ///
+    /// let direction = DVec3::new(0.6, 0.0, 0.8);
+    /// assert_eq!(Placement::FLAT.seen(direction), direction);
+    /// let wedge = Placement { tilt: 0.3, ..Placement::FLAT };
+    /// assert!((wedge.seen(wedge.normal()) - DVec3::Z).length() < 1e-15);
+    /// ```
+    pub fn seen(&self, of_rig: DVec3) -> DVec3 {
+        self.of_rig() * of_rig
+    }
+
     /// The direction of an arm at `alpha`, rad from the rig's normal, as a unit vector in the frame of the specimen.
     ///
     /// For a wedge about the plane of the arms it is (sin α, −cos α sin τ, cos α cos τ).
     pub fn direction(&self, alpha: f64) -> DVec3 {
         let (sin, cos) = alpha.sin_cos();
-        self.of_rig() * DVec3::new(sin, 0.0, cos)
+        self.seen(DVec3::new(sin, 0.0, cos))
     }
 
     /// The true directions to light and sensor, whose arms stand at these angles, rad; `None` where either stands at the
