@@ -181,7 +181,10 @@ mod tests {
         obey("sim.place.axis_deg = 90", &mut rig, &mut server).unwrap();
         let place = Settings::new(&rig).unwrap().place;
         let [tilt, axis] = [place.tilt, place.axis].map(f64::to_degrees);
-        assert!((tilt - 20.0).abs() < 1e-12 && (axis - 90.0).abs() < 1e-12, "{place:?}");
+        assert!(
+            (tilt - 20.0).abs() < 1e-12 && (axis - 90.0).abs() < 1e-12,
+            "{place:?}"
+        );
         assert!(obey("sim.place.tilt_deg = 61", &mut rig, &mut server).is_err());
         assert_eq!(Settings::new(&rig).unwrap().place, place);
     }

@@ -8,6 +8,8 @@ use crate::{FactorTable, Model, WedgeReading};
 
 /// The least reflectance, sr⁻¹, that has a logarithm.
 const LEAST: f64 = 1e-9;
+/// Cosine of 80°: beyond it f rises so steeply, and an instrument errs so much, that a reading says nothing of what lies below.
+const LEAST_COSINE: f64 = 0.173_648;
 /// What a reading may ask for and what a pair may get, in ln f: a factor of 4.5.
 const MOST: f64 = 1.5;
 /// What a reading tells however far it lies from a pair, as a share of what it tells at its own place.
@@ -59,7 +61,7 @@ pub struct Corrected {
 pub struct Check {
     /// Readings that the correction is made of.
     pub readings: usize,
-    /// Readings that were not finite, lay below the horizon, or lay in the plane and so tell nothing.
+    /// Readings that were not finite, had a direction beyond 80°, or lay in the plane and so tell nothing.
     pub dropped: usize,
     /// How far the model was from them; `None` where no channel of any reading can be compared.
     pub before: Option<f64>,
@@ -93,7 +95,7 @@ impl Asked {
             rgb,
         } = *reading;
         let finite = incident.is_finite() && exitant.is_finite() && rgb.is_finite();
-        if !finite || incident.z <= 0.0 || exitant.z <= 0.0 || !model.valid(incident, exitant) {
+        if !finite || incident.z.min(exitant.z) < LEAST_COSINE || !model.valid(incident, exitant) {
             return None;
         }
         let pair = Pair::new(incident, exitant);

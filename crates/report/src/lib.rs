@@ -28,6 +28,7 @@ mod sensitivity;
 mod slice;
 mod standard;
 mod uncertainty;
+mod wedge;
 
 pub use adapt::{Adapted, extension};
 pub use check::{Check, Verdict};
@@ -49,3 +50,4 @@ pub use report::{
 pub use run::{Given, GivenRig, Readings, Run, Seconds, State, Used, flag_name};
 pub use standard::{Standard, WhiteReference};
 pub use uncertainty::COVERAGE;
+pub use wedge::wedge_readings;

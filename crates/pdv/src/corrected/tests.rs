@@ -36,12 +36,15 @@ fn readings() -> impl Strategy<Value = Vec<WedgeReading>> {
         rgb,
         prop::bool::weighted(0.05),
     );
-    let reading = one.prop_filter_map("beneath the specimen", |(tilt, m, delta, logs, below)| {
+    let reading = one.prop_filter_map("beyond 80°", |(tilt, m, delta, logs, below)| {
         let on = Placement {
             tilt,
             ..Placement::FLAT
         };
         let read = WedgeReading::of(&*PLAIN, &on, m - delta, m + delta)?;
+        if read.incident.z.min(read.exitant.z) < LEAST_COSINE {
+            return None;
+        }
         let factor = DVec3::from_array(logs.map(f64::exp));
         let noise = if below { 1e-3 } else { 0.0 };
         Some(WedgeReading {
@@ -189,9 +192,13 @@ fn what_cannot_be_used_is_dropped_and_a_black_model_stays_black() {
             exitant: -good.exitant,
             ..good
         },
+        WedgeReading {
+            rgb: 3.0 * good.rgb,
+            ..WedgeReading::of(&*PLAIN, &wedge, 1.42, 0.0).unwrap()
+        },
     ];
     let model = corrected(&bad);
-    assert_eq!((model.check().readings, model.check().dropped), (0, 3));
+    assert_eq!((model.check().readings, model.check().dropped), (0, 4));
     assert_eq!(model.eval(good.incident, good.exitant), good.rgb);
     let black = |deviation| Observation {
         theta_r: 0.5,

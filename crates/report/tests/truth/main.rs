@@ -13,3 +13,4 @@ mod servos;
 mod standards;
 mod uncertainty;
 mod verdicts;
+mod wedge;
