@@ -11,6 +11,7 @@ use study::Shard;
 
 use crate::bound::Bound;
 use crate::junit::Junit;
+use crate::wedge::Wedge;
 use crate::{export, schema};
 
 /// Measures how a flat specimen reflects light, with two servo arms and a photometer.
@@ -253,6 +254,10 @@ pub(crate) enum Command {
         /// given.
         #[arg(long, value_name = "FILE")]
         to: Option<PathBuf>,
+        /// Correct the result out of the arms' plane by a run of the same specimen that lay on a wedge of so many degrees, 15 …
+        /// 60, about the line in which that plane meets the stage; once for each such run. What it changed is told.
+        #[arg(long = "wedge", value_name = "DEGREES=RUN")]
+        wedges: Vec<Wedge>,
         #[command(flatten)]
         daemon: DaemonArguments,
     },

@@ -8,6 +8,7 @@ use report::RunExport;
 
 use crate::cli::DaemonArguments;
 use crate::run_files::RunFiles;
+use crate::wedge::{Wedge, correct};
 
 /// The readings of a run, which are no BRDF and so no format of `formats`.
 const READINGS: &str = "csv";
@@ -25,8 +26,8 @@ pub(crate) fn words() -> impl Iterator<Item = &'static str> {
 
 /// Writes the result of a run in one format to a file, or to stdout; or prints the list of formats.
 ///
-/// What the run directory holds in that format is copied. Else the run's model is rebuilt from its readings, and the
-/// figures of what was written go to stderr.
+/// What the run directory holds in that format is copied. Else the run's model is rebuilt from its readings, and corrected
+/// by those on wedges; the figures of what was written go to stderr.
 ///
 /// # Errors
 /// No run is named, or there is none; it is not complete; the format does not hold its result; the target cannot be
@@ -36,10 +37,15 @@ pub(crate) fn export(
     daemon: &DaemonArguments,
     format: &str,
     to: Option<&Path>,
+    wedges: &[Wedge],
 ) -> anyhow::Result<()> {
     if format == LIST {
         return list();
     }
+    anyhow::ensure!(
+        format != READINGS || wedges.is_empty(),
+        "--wedge corrects the BRDF, and \"{READINGS}\" has the readings alone; name another format"
+    );
     let run = run.context("the run is missing: gonioctl export RUN --format NAME")?;
     let files = RunFiles::find(run, daemon)?;
     let to = target(&files, format, to)?;
@@ -49,7 +55,8 @@ pub(crate) fn export(
         "merl" => Some("brdf.binary"),
         "exr" => Some("slice.exr"),
         _ => None,
-    };
+    }
+    .filter(|_| wedges.is_empty());
     let found = kept.map(|name| files.open(name)).transpose()?.flatten();
     if let Some(mut found) = found {
         return put(to, |mut out| io::copy(&mut found, &mut out).map(drop));
@@ -58,7 +65,7 @@ pub(crate) fn export(
         format != READINGS,
         "this run has no readings.csv; `gonioctl reconstruct` makes it of its journal"
     );
-    let result = RunExport::from_records(&files.records()?)?;
+    let result = correct(RunExport::from_records(&files.records()?)?, wedges, daemon)?;
     if format == ALL {
         return put(to, |out| result.archive(out));
     }

@@ -34,6 +34,7 @@ mod screen;
 mod signals;
 mod study;
 mod watch;
+mod wedge;
 
 use std::process::ExitCode;
 
@@ -157,8 +158,9 @@ fn command(command: Command) -> anyhow::Result<ExitCode> {
             run,
             format,
             to,
+            wedges,
             daemon,
-        } => export::export(run.as_deref(), &daemon, &format, to.as_deref())?,
+        } => export::export(run.as_deref(), &daemon, &format, to.as_deref(), &wedges)?,
         Command::Convert { from, to, format } => convert::convert(&from, &to, format.as_deref())?,
         Command::Eval {
             truth,

@@ -5,7 +5,7 @@ use arms::ArmAngle;
 use brdf::Brdf;
 use capture::{FileJournal, Flag, Record};
 use formats::{Export, Exported, FORMATS, Fidelity, Format, Metadata, Reading};
-use pdv::Model;
+use pdv::{Check, Corrected, Model, WedgeReading};
 use rig::RigFile;
 use serde::Serialize;
 use sweep::Job;
@@ -66,6 +66,16 @@ impl RunExport {
             metadata: metadata(&job, &rig, &run, &measurements),
             measurements,
         })
+    }
+
+    /// Corrects the model out of the arms' plane by readings of the same specimen on wedges, which also says how far it was
+    /// from them. Without any it stays as it is.
+    #[must_use]
+    pub fn corrected(self, readings: &[WedgeReading]) -> (Self, Check) {
+        let corrected = Corrected::new(self.model, readings);
+        let check = corrected.check();
+        let model: Box<dyn Model> = Box::new(corrected);
+        (Self { model, ..self }, check)
     }
 
     /// What is written into a file.

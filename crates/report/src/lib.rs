@@ -50,4 +50,4 @@ pub use report::{
 pub use run::{Given, GivenRig, Readings, Run, Seconds, State, Used, flag_name};
 pub use standard::{Standard, WhiteReference};
 pub use uncertainty::COVERAGE;
-pub use wedge::wedge_readings;
+pub use wedge::{readings_on_wedge, wedge_readings};

@@ -1,8 +1,10 @@
+use capture::Record;
 use pdv::{Placement, WedgeReading};
-use rig::{Filling, MIN_COSINE};
+use rig::{Filling, MIN_COSINE, RigFile};
 use sweep::Sweep;
 
-use crate::Measurement;
+use crate::measurement::certificate;
+use crate::{Measurement, ReportError, measurements};
 
 /// What a run says of its specimen when that lay on a wedge throughout, by its true directions: every reading of a plane or
 /// of the arc that counts, was not in shadow, and stood above the specimen.
@@ -27,4 +29,23 @@ pub fn wedge_readings(measurements: &[Measurement], on: &Placement, filling: Fil
         })
     };
     measurements.iter().filter(counts).filter_map(reading).collect()
+}
+
+/// The same from the records of a journal, complete or not.
+///
+/// # Errors
+/// Records without a header, whose file is called the journal then; a rig file or a calibration that this version does not
+/// accept.
+pub fn readings_on_wedge(records: &[Record], on: &Placement) -> Result<Vec<WedgeReading>, ReportError> {
+    let Some(Record::Header(header)) = records.first() else {
+        return Err(ReportError::NoHeader {
+            path: "the journal".into(),
+        });
+    };
+    let rig = RigFile::parse(&header.rig, "rig file".as_ref()).map_err(ReportError::Rig)?;
+    if let Some(certificate) = certificate(records) {
+        certificate.check(&rig).map_err(ReportError::Certificate)?;
+    }
+    let filling = rig.calibration.filling;
+    Ok(wedge_readings(&measurements(records, &rig), on, filling))
 }

@@ -87,11 +87,8 @@ fn main() -> Result<(), Failed> {
     while let Some(arg) = args.next() {
         match arg.as_str() {
             "--every" => {
-                every = args
-                    .next()
-                    .ok_or("--every needs a number")?
-                    .parse::<usize>()?
-                    .max(1)
+                let number = args.next().ok_or("--every needs a number")?;
+                every = number.parse::<usize>()?.max(1);
             }
             _ => folders.push(PathBuf::from(arg)),
         }

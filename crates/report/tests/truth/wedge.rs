@@ -1,9 +1,8 @@
 //! Whether what is read of a specimen on a wedge is true of its true directions.
 
 use brdf::Brdf;
-use pdv::{Corrected, Draw, Placement, compare};
-use report::{Sweeps, measurements, wedge_readings};
-use sweep::Job;
+use pdv::{Draw, Placement, compare};
+use report::{RunExport, measurements, readings_on_wedge, wedge_readings};
 
 use crate::bench::Laboratory;
 
@@ -53,26 +52,23 @@ async fn a_model_is_nearer_to_a_specimen_that_also_lay_on_wedges() {
     for name in ["white-fabric", "blue-rubber", "nylon", "gold-paint"] {
         let specimen = brdf::specimen(name).expect("a known specimen");
         let flat = Laboratory::new("");
-        let job = Job::parse(FLAT, "flat.toml").expect("a good job");
         let records = flat.measure(specimen.clone(), FLAT).await;
-        let sweeps = Sweeps::new(&job, &measurements(&records, &flat.file));
         let mut readings = Vec::new();
         for tilt_deg in [20.0, 45.0] {
             let (sim, place) = on_wedge(tilt_deg, 0.0);
             let rig = Laboratory::new(&sim);
-            let all = measurements(&rig.measure(specimen.clone(), ON_WEDGE).await, &rig.file);
-            readings.extend(wedge_readings(&all, &place, rig.file.calibration.filling));
+            let on_wedge = rig.measure(specimen.clone(), ON_WEDGE).await;
+            readings.extend(readings_on_wedge(&on_wedge, &place).expect("a sound journal"));
         }
-        let plain = sweeps.model(&job).expect("enough readings");
-        let corrected = Corrected::new(sweeps.model(&job).expect("enough readings"), &readings);
+        let result = || RunExport::from_records(&records).expect("enough readings");
+        let (plain, (corrected, check)) = (result(), result().corrected(&readings));
         let draw = Draw {
             pairs: 20_000,
             ..Draw::default()
         };
-        let estimates: [&dyn Brdf; 2] = [plain.as_ref(), &corrected];
+        let estimates: [&dyn Brdf; 2] = [plain.export().brdf, corrected.export().brdf];
         let found = compare(specimen.as_ref(), &estimates, &draw);
         let [plain, with] = [0, 1].map(|n| found[n].overall.male.expect("pairs were drawn"));
-        let check = corrected.check();
         println!("{name}: MALE {plain:.5}, with wedges {with:.5}; {check:?}");
         assert!(check.after < check.before, "{check:?}");
         before += plain;
