@@ -171,7 +171,7 @@ fn every_inline_table_of_the_documents_is_taken() {
             let what = order(&format!("fault = {{ device = \"sensor\", what = {table} }}"));
             let silent = rig(&format!("sim.wire.silent = [{table}]"));
             let plane = job(&format!("plane = [{table}]"));
-            let keys = ["light", "creep", "hunting", "ring", "encoder_error"];
+            let keys = ["light", "creep", "hunting", "ring", "encoder_error", "place"];
             let mechanics = keys.map(|key| rig(&format!("sim.{key} = {table}")));
             let readings = [vec![fault, what, silent, plane], mechanics.into()].concat();
             assert_taken(&path, table, &readings);

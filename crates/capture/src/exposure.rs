@@ -238,7 +238,7 @@ fn along(sweep: Sweep, pose: Pose) -> f64 {
 /// How unlike the reflectances at two poses may be, in rad: by isotropy the side of the mirror direction says nothing, and
 /// with the difference angle a reflectance changes less than with the half angle.
 fn apart(a: &Pose, b: &Pose) -> f64 {
-    const DIFFERENCE: f64 = 0.3;
+    const DIFFERENCE: f64 = 0.5;
     let half = |pose: &Pose| (pose.light.rad() + pose.sensor.rad()).abs();
     (half(a) - half(b)).abs() + DIFFERENCE * (a.separation_rad() - b.separation_rad()).abs()
 }

@@ -15,8 +15,8 @@ pub(crate) fn allowed_rel(file: &RigFile, rate: f64) -> f64 {
     file.photometer.flight_noise_rel.max(unfelt.min(MOST_REL))
 }
 
-/// Beyond this a reading says little even of the dark.
-const MOST_REL: f64 = 0.3;
+/// Beyond this nobody would call it a measurement, however dark it is.
+const MOST_REL: f64 = 0.05;
 
 /// How many exposures in flight are as long as the longest at rest: what needs more light than one is better read at rest.
 const LONGEST: f64 = 2.0;

@@ -29,10 +29,12 @@ async fn nothing_that_counts_is_in_shadow(rig: &str, job: &str, specimen: &str) 
         let Some(f) = m.rgb() else { continue };
         if clearance < 5f64.to_radians() {
             beside += 1;
-            let off = f / specimen.eval(m.pose.incident(), m.pose.exitant()) - 1.0;
+            let truth = specimen.eval(m.pose.incident(), m.pose.exitant());
+            // Where it is so dark that nobody feels the noise, a reading in flight may have more of it, and says so.
+            let allowed = (0.08 * truth).max(1.5 * m.u.unwrap_or_default());
             assert!(
-                off.abs().max_element() < 0.08,
-                "{rig}{job}: {off} at {:?}",
+                (f - truth).abs().cmple(allowed).all(),
+                "{rig}{job}: {f} instead of {truth} at {:?}",
                 m.pose
             );
         }

@@ -86,7 +86,7 @@ async fn carry_out<B: Bench>(script: &Script) -> Result<Carried, String> {
         certificate: None,
     })]);
     let (_operator, control) = watch::channel(Command::Run);
-    let mut last = String::new();
+    let mut faults = Vec::new();
     for execution in 1..=MAX_EXECUTIONS {
         let mut look = |_| bench.look();
         let run = capture::run(&mut drive, &mut journal, control.clone(), &mut look);
@@ -124,13 +124,14 @@ async fn carry_out<B: Bench>(script: &Script) -> Result<Carried, String> {
             }
             Outcome::Stopped => return Err("stopped by nobody".to_owned()),
             Outcome::Failed { fault } if fault.is_empty() => return Err("a fault without words".to_owned()),
-            Outcome::Failed { fault } => last = fault,
+            Outcome::Failed { fault } => faults.push(fault),
         }
         drive = bench.mend(drive, &file)?;
         bench.rest().await;
     }
     Err(format!(
-        "not complete after {MAX_EXECUTIONS} executions; last: {last}"
+        "not complete after {MAX_EXECUTIONS} executions: {}",
+        faults.join("; ")
     ))
 }
 
