@@ -161,7 +161,9 @@ fn merged<'a>(points: impl Iterator<Item = &'a Point>, same: impl Fn(&Point, &Po
     let mut merged = Vec::new();
     let mut rest = points.as_slice();
     while let Some(first) = rest.first() {
-        let n = rest.iter().position(|p| !same(first, p)).unwrap_or(rest.len());
+        // The first is at its own place, whatever is asked.
+        let others = rest[1..].iter().take_while(|p| same(first, p)).count();
+        let n = 1 + others;
         let (at_one_place, after) = rest.split_at(n);
         merged.push(mean(at_one_place));
         rest = after;

@@ -244,13 +244,19 @@ fn sharpen(measurements: &mut [Measurement], records: &[Record]) {
             let [light, sensor] = measurements[i].reading.swept_rad.unwrap_or_default();
             let width = light.hypot(sensor);
             let added = points.each_ref().map(|points| capture::blur(points, at, width));
-            let sharp = measurements[i]
-                .rgb()
-                .map(|rgb| Ok(rgb - DVec3::from_array(added)));
+            let sharp = measurements[i].rgb().map(|rgb| {
+                // Beside a peak that is narrower than its readings are apart a parabola says what no lobe does; of what the
+                // capture let count the motion has added less.
+                let most = MOST_BLUR * rgb.abs();
+                Ok(rgb - DVec3::from_array(added).clamp(-most, most))
+            });
             measurements[i].reflectance = sharp;
         }
     }
 }
+
+/// Share of a reflectance that motion may have added to it: twice what a capture lets count.
+const MOST_BLUR: f64 = 0.1;
 
 /// Share of a reflectance that one reading differs from the next of the same pose by, whatever its counts: no reading
 /// weighs more than that is worth.

@@ -140,6 +140,8 @@ async fn arms_that_fly_together_never_meet_whatever_stops() {
             for device in SERVOS {
                 scene.bench.reboot(device);
             }
+            // A device that restarts is deaf for a while.
+            tokio::time::sleep(Duration::from_secs(2)).await;
             let again = scene
                 .run(|_| ())
                 .await
