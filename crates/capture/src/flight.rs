@@ -32,8 +32,8 @@ pub(crate) struct Flight<'a> {
     shares: [f64; 2],
     /// Where the arms were told to go: the end, or as far towards it as was safe.
     pub(crate) goals: Pose,
-    /// The last pose as the servos take it.
-    last: Pose,
+    /// Where the pass ends, as the servos take it.
+    pub(crate) end: Pose,
     tracks: [Track; 2],
     /// Angle of the first step, +1 or −1, and the way from there to each step and its cell's ends, rad.
     from: f64,
@@ -83,7 +83,7 @@ impl<'a> Flight<'a> {
             moving,
             shares,
             goals: first,
-            last: file.nearest(last),
+            end: file.nearest(last),
             idle_s,
         }
     }
@@ -94,12 +94,7 @@ impl<'a> Flight<'a> {
 
     /// Whether the arms were told to go to the end.
     pub(crate) fn ends(&self) -> bool {
-        self.goals == self.last
-    }
-
-    /// Where the pass ends.
-    pub(crate) fn end(&self) -> Pose {
-        self.steps[self.steps.len() - 1].pose()
+        self.goals == self.end
     }
 
     /// The rig was observed.
@@ -137,7 +132,7 @@ impl<'a> Flight<'a> {
     pub(crate) fn lead_to(&mut self, goals: Pose) -> bool {
         let farther = self.moving.iter().any(|&arm| {
             let by = (goals.angle(arm) - self.goals.angle(arm)).abs();
-            by >= STRIDE_RAD || (by > 0.0 && goals.angle(arm) == self.last.angle(arm))
+            by >= STRIDE_RAD || (by > 0.0 && goals.angle(arm) == self.end.angle(arm))
         });
         if farther {
             self.goals = goals;

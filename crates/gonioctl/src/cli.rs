@@ -492,6 +492,7 @@ mod tests {
         assert!(parse(&["job.toml", "--resume", "runs/1"]).is_err());
         assert!(parse(&["--resume", "runs/1", "--out", "elsewhere"]).is_err());
     }
+
     #[test]
     fn a_study_is_done_whole_in_shards_or_merged() {
         let parse = |arguments: &[&str]| Cli::try_parse_from([&["gonioctl", "study"], arguments].concat());

@@ -1,20 +1,17 @@
 use capture::Record;
 use pdv::{Placement, WedgeReading};
 use rig::{Filling, MIN_COSINE, RigFile};
-use sweep::Sweep;
 
 use crate::measurement::certificate;
 use crate::{Measurement, ReportError, measurements};
 
-/// What a run says of its specimen when that lay on a wedge throughout, by its true directions: every reading of a plane or
-/// of the arc that counts, was not in shadow, and stood above the specimen.
+/// What a run says of its specimen when that lay on a wedge throughout, by its true directions: every reading of a plane, a leg
+/// or the arc that counts, was not in shadow, and stood above the specimen.
 ///
 /// Rig and measurements take a specimen to lie flat, so that their reflectances are divided by a cosine of the arms; here they
 /// are by that of the true direction, of the light or the sensor as `filling` has it.
 pub fn wedge_readings(measurements: &[Measurement], on: &Placement, filling: Filling) -> Vec<WedgeReading> {
-    let counts = |m: &&Measurement| {
-        m.reading.accepted && !m.shadowed && matches!(m.reading.sweep, Sweep::Plane(_) | Sweep::Arc)
-    };
+    let counts = |m: &&Measurement| m.reading.accepted && !m.shadowed && m.reading.sweep.is_measured();
     let reading = |m: &Measurement| {
         let (incident, exitant) = on.pair(m.pose.light.rad(), m.pose.sensor.rad())?;
         let cosine = match filling {

@@ -93,9 +93,13 @@ fn between(plan: &Plan, sweep: Sweep, reach: Reach<'_>) -> Targets {
     known.sort_by(|a, b| a.angle(arm).rad().total_cmp(&b.angle(arm).rad()));
     known.dedup();
     let middle = |pair: &[Pose]| {
-        Arm::BOTH.into_iter().fold(pair[0], |pose, arm| {
+        let half_way = |arm: Arm| {
             let [a, b] = [pair[0], pair[1]].map(|pose| pose.angle(arm).rad());
-            pose.with(arm, mechanics.nearest(arm, ArmAngle::from_rad(0.5 * (a + b))))
+            ArmAngle::from_rad(0.5 * (a + b))
+        };
+        mechanics.nearest_pose(Pose {
+            light: half_way(Arm::Light),
+            sensor: half_way(Arm::Sensor),
         })
     };
     let poses = known

@@ -81,6 +81,16 @@ pub enum Mode {
     Fly,
 }
 
+impl Mode {
+    /// As job files name it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Step => "step",
+            Self::Fly => "fly",
+        }
+    }
+}
+
 /// One plane sweep: the sensor stands at θ_r, the light crosses the plane.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Plane {

@@ -1,9 +1,10 @@
 use arms::{Arm, ArmAngle, Pose, Trajectory};
 use serde::Serialize;
 
+use crate::pass::lead;
 use crate::reach::Reach;
-use crate::targets::{Stretches, Targets};
-use crate::{Job, LeftOut, Mechanics, Sweep, SweepError};
+use crate::targets::{Stretches, Targets, too_close};
+use crate::{Job, Mechanics, Sweep, SweepError};
 
 /// Time between two readings of a leg far from the mirror direction, s: thirty a second are nearly as good as any number.
 const EVERY_S: f64 = 1.0 / 30.0;
@@ -87,12 +88,7 @@ impl Leg {
 pub(crate) fn leg(job: &Job, index: usize, reach: Reach<'_>) -> Result<Targets, SweepError> {
     let leg = &job.legs[index];
     let mechanics = reach.mechanics;
-    let on_grid = |share: f64| {
-        let pose = leg.pose(share);
-        Arm::BOTH.into_iter().fold(pose, |pose, arm| {
-            pose.with(arm, mechanics.nearest(arm, pose.angle(arm)))
-        })
-    };
+    let on_grid = |share: f64| mechanics.nearest_pose(leg.pose(share));
     let share = |i: usize| i as f64 / FINE as f64;
     let stretches = Stretches::new(reach, (0..=FINE).map(|i| on_grid(share(i))));
     let Some(free) = stretches.longest() else {
@@ -105,9 +101,9 @@ pub(crate) fn leg(job: &Job, index: usize, reach: Reach<'_>) -> Result<Targets, 
     let sweep = Sweep::Leg(index);
     let mut left_out = stretches.left_out(reach, &sweep.to_string(), Arm::Sensor);
     let stretch = [share(free.start), share(free.end - 1)];
-    let lead = lead(leg, stretch);
-    let times = times(leg, stretch, mechanics);
-    let mut poses: Vec<Pose> = times.into_iter().map(on_grid).collect();
+    let lead = lead(leg.pose(stretch[0]), leg.pose(stretch[1]));
+    let shares = shares(leg, stretch, lead, mechanics);
+    let mut poses: Vec<Pose> = shares.into_iter().map(on_grid).collect();
     let asked = poses.len();
     // Nor may the arm that goes farther stand from one to the next.
     let end = poses.last().copied();
@@ -116,13 +112,8 @@ pub(crate) fn leg(job: &Job, index: usize, reach: Reach<'_>) -> Result<Targets, 
     if let (Some(last), Some(end)) = (poses.last_mut(), end) {
         *last = end;
     }
-    if poses.len() < asked && leg.readings.is_some() {
-        left_out.push(LeftOut {
-            what: format!("{sweep}, {} readings", asked - poses.len()),
-            why: "closer than one servo count to their neighbours".to_owned(),
-            readings: asked - poses.len(),
-            seconds: 0.0,
-        });
+    if leg.readings.is_some() {
+        left_out.extend(too_close(asked - poses.len(), &sweep.to_string(), "readings"));
     }
     Ok(Targets {
         sweep,
@@ -131,20 +122,8 @@ pub(crate) fn leg(job: &Job, index: usize, reach: Reach<'_>) -> Result<Targets, 
     })
 }
 
-/// The arm that goes farther between two shares of the way of a leg.
-fn lead(leg: &Leg, ends: [f64; 2]) -> Arm {
-    let [from, to] = ends.map(|share| leg.pose(share));
-    let way = |arm: Arm| (to.angle(arm) - from.angle(arm)).abs();
-    if way(Arm::Light) >= way(Arm::Sensor) {
-        Arm::Light
-    } else {
-        Arm::Sensor
-    }
-}
-
-/// Shares of the way of a leg at which it is read, between two of them.
-fn times(leg: &Leg, [from, to]: [f64; 2], mechanics: &Mechanics) -> Vec<f64> {
-    let lead = lead(leg, [from, to]);
+/// Shares of the way of a leg at which it is read, between two of them; `lead` is the arm that goes farther.
+fn shares(leg: &Leg, [from, to]: [f64; 2], lead: Arm, mechanics: &Mechanics) -> Vec<f64> {
     let length = (leg.pose(to).angle(lead) - leg.pose(from).angle(lead)).abs();
     let motion = Trajectory::new(0.0, 0.0, length, mechanics.profiles[lead as usize]);
     let duration_s = motion.duration_s();

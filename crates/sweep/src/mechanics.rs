@@ -73,6 +73,13 @@ impl Mechanics {
         self.angle(arm, self.steps(arm, angle).round())
     }
 
+    /// The pose nearest to `pose` that both servos can take.
+    pub(crate) fn nearest_pose(&self, pose: Pose) -> Pose {
+        Arm::BOTH.into_iter().fold(pose, |pose, arm| {
+            pose.with(arm, self.nearest(arm, pose.angle(arm)))
+        })
+    }
+
     /// Every angle within `from` … `to` that the arm's servo can take, ascending.
     pub(crate) fn angles(&self, arm: Arm, from: ArmAngle, to: ArmAngle) -> impl Iterator<Item = ArmAngle> {
         let (first, last) = (

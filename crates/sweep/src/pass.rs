@@ -18,10 +18,7 @@ const ALIKE_STEPS: f64 = 1.5;
 pub(crate) fn pass(mechanics: &Mechanics, poses: &[Pose]) -> Option<Vec<f64>> {
     let (first, last) = (*poses.first()?, *poses.last()?);
     let way = |pose: &Pose, arm: Arm| (pose.angle(arm) - first.angle(arm)).abs();
-    let lead = match way(&last, Arm::Light) >= way(&last, Arm::Sensor) {
-        true => Arm::Light,
-        false => Arm::Sensor,
-    };
+    let lead = lead(first, last);
     let sound = poses.len() >= FEWEST && together(mechanics, poses, lead) && free(mechanics, poses);
     let along: Vec<f64> = poses.iter().map(|pose| way(pose, lead)).collect();
     let onward = along.windows(2).all(|pair| pair[0] < pair[1]);
@@ -32,6 +29,15 @@ pub(crate) fn pass(mechanics: &Mechanics, poses: &[Pose]) -> Option<Vec<f64>> {
         .collect();
     let profile = mechanics.profiles[lead as usize];
     (sound && onward).then(|| seconds(&along, &widths, profile, mechanics.flight_s))
+}
+
+/// The arm that goes farther from one pose to another.
+pub(crate) fn lead(from: Pose, to: Pose) -> Arm {
+    let way = |arm: Arm| (to.angle(arm) - from.angle(arm)).abs();
+    match way(Arm::Light) >= way(Arm::Sensor) {
+        true => Arm::Light,
+        false => Arm::Sensor,
+    }
 }
 
 /// Whether nothing is in the way of the arms from each pose to the next.

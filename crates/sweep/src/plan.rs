@@ -24,6 +24,11 @@ impl Sweep {
     pub fn is_curve(self) -> bool {
         matches!(self, Self::Plane(_) | Self::Leg(_))
     }
+
+    /// Whether its readings make the model: a curve, or the arc.
+    pub fn is_measured(self) -> bool {
+        self.is_curve() || self == Self::Arc
+    }
 }
 
 impl std::fmt::Display for Sweep {

@@ -1,4 +1,4 @@
-use arms::{Arm, Pose};
+use arms::Pose;
 
 use crate::leg::leg;
 use crate::order::order;
@@ -176,17 +176,12 @@ pub struct Visit {
 /// # Errors
 /// The arms stand outside the envelope; a pose that cannot be reached or is in shadow.
 pub fn visits(name: &str, visits: &[Visit], mechanics: &Mechanics) -> Result<Plan, SweepError> {
-    let nearest = |pose: Pose| {
-        Arm::BOTH.into_iter().fold(pose, |pose, arm| {
-            pose.with(arm, mechanics.nearest(arm, pose.angle(arm)))
-        })
-    };
     let start = match mechanics.start {
         Some(pose) => Standing::measured(mechanics, pose)?,
         None => Standing {
             pose: visits
                 .first()
-                .map_or(Pose::default(), |visit| nearest(visit.pose)),
+                .map_or(Pose::default(), |visit| mechanics.nearest_pose(visit.pose)),
             approached: false,
         },
     };
@@ -194,7 +189,7 @@ pub fn visits(name: &str, visits: &[Visit], mechanics: &Mechanics) -> Result<Pla
     let mut draft = Draft::new(mechanics, start);
     draft.dark();
     for visit in visits {
-        let pose = nearest(visit.pose);
+        let pose = mechanics.nearest_pose(visit.pose);
         let refuse = |why: String| SweepError::Unreachable {
             file: name.to_owned(),
             key: format!("light {:.1}°, sensor {:.1}°", pose.light.deg(), pose.sensor.deg()),

@@ -35,15 +35,19 @@ impl Stretches {
         Self { poses, stretches }
     }
 
-    fn reachable(&self) -> impl Iterator<Item = &[Pose]> {
+    /// The stretches that can be measured, by the places of their poses.
+    fn free(&self) -> impl Iterator<Item = &Range<usize>> {
         let free = self.stretches.iter().filter(|(_, hindrance)| hindrance.is_none());
-        free.map(|(range, _)| &self.poses[range.clone()])
+        free.map(|(range, _)| range)
+    }
+
+    fn reachable(&self) -> impl Iterator<Item = &[Pose]> {
+        self.free().map(|range| &self.poses[range.clone()])
     }
 
     /// The longest stretch that can be measured, by the places of its poses.
     pub(crate) fn longest(&self) -> Option<Range<usize>> {
-        let free = self.stretches.iter().filter(|(_, hindrance)| hindrance.is_none());
-        free.map(|(range, _)| range.clone()).max_by_key(Range::len)
+        self.free().max_by_key(|range| range.len()).cloned()
     }
 
     /// What hinders most of the poses, in words.
@@ -115,14 +119,8 @@ pub(crate) fn plane(job: &Job, index: usize, reach: Reach<'_>) -> Result<Targets
         pin(&mut poses, crossing, Arm::Light);
     }
     poses.dedup();
-    if poses.len() < plane.readings {
-        left_out.push(LeftOut {
-            what: format!("{name}, {} values of d_p", plane.readings - poses.len()),
-            why: "closer than one servo count to their neighbours".to_owned(),
-            readings: plane.readings - poses.len(),
-            seconds: 0.0,
-        });
-    }
+    let missing = plane.readings.saturating_sub(poses.len());
+    left_out.extend(too_close(missing, &name, "values of d_p"));
     Ok(Targets {
         sweep: Sweep::Plane(index),
         poses,
@@ -172,18 +170,22 @@ pub(crate) fn arc(job: &Job, arc: &Arc, reach: Reach<'_>) -> Result<Targets, Swe
         }
     }
     poses.dedup();
-    if poses.len() < arc.readings {
-        left_out.push(LeftOut {
-            what: format!("arc, {} values of θ_r", arc.readings - poses.len()),
-            why: "closer than one servo count to their neighbours".to_owned(),
-            readings: arc.readings - poses.len(),
-            seconds: 0.0,
-        });
-    }
+    let missing = arc.readings.saturating_sub(poses.len());
+    left_out.extend(too_close(missing, "arc", "values of θ_r"));
     Ok(Targets {
         sweep: Sweep::Arc,
         poses,
         left_out,
+    })
+}
+
+/// What a sweep leaves out since its servos cannot tell so many poses apart; nothing where it has them all.
+pub(crate) fn too_close(missing: usize, sweep: &str, what: &str) -> Option<LeftOut> {
+    (missing > 0).then(|| LeftOut {
+        what: format!("{sweep}, {missing} {what}"),
+        why: "closer than one servo count to their neighbours".to_owned(),
+        readings: missing,
+        seconds: 0.0,
     })
 }
 

@@ -108,7 +108,7 @@ impl<R: Rig> Execution<'_, R> {
         self.pace(flight, &ranging, now_s);
         self.steer(flight).await?;
         let (_, now_s) = self.sight(flight).await?;
-        flight.goals = self.drive.ahead(flight.end()).await?;
+        flight.goals = self.drive.ahead(flight.end).await?;
         self.drive.set_off(flight.goals).await?;
         flight.steered(now_s);
         let mut retries = self.drive.retries();
@@ -183,7 +183,7 @@ impl<R: Rig> Execution<'_, R> {
         if flight.ends() {
             return Ok(false);
         }
-        let goals = self.drive.ahead(flight.end()).await?;
+        let goals = self.drive.ahead(flight.end).await?;
         if !flight.lead_to(goals) {
             return Ok(false);
         }

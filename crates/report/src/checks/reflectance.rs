@@ -23,9 +23,7 @@ type Found = (Verdict, String);
 
 /// Whether the readings tell a reflectance at all, in every sweep and in every colour that the job asks for.
 pub(crate) fn reflectance(measurements: &[Measurement], job: &Job) -> Check {
-    let counts = |m: &&Measurement| {
-        m.reading.accepted && (m.reading.sweep.is_curve() || m.reading.sweep == Sweep::Arc) && !m.shadowed
-    };
+    let counts = |m: &&Measurement| m.reading.accepted && m.reading.sweep.is_measured() && !m.shadowed;
     let lit: Vec<&Measurement> = measurements.iter().filter(counts).collect();
     let usable: Vec<&Measurement> = lit.iter().copied().filter(|m| is_usable(m)).collect();
     let mut found = Vec::new();

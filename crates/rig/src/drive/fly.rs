@@ -1,7 +1,7 @@
 use arms::{Arm, ArmAngle, Envelope, Pose, Profile};
 
 use super::{Drive, DriveError};
-use crate::{Actuator, Observation, Rig};
+use crate::{Actuator, Observation, Rig, Snapshot};
 
 /// How much further apart than the separation the goals keep of arms that could meet if one of them stood still, rad: 2°, more
 /// than an arm rings by when it stops.
@@ -16,11 +16,7 @@ impl<R: Rig> Drive<R> {
     /// # Errors
     /// As [`Drive::snapshot`], where nobody looked yet.
     pub async fn ahead(&mut self, to: Pose) -> Result<Pose, DriveError<R::Error>> {
-        let seen = *self.seen.borrow();
-        let seen = match seen {
-            Some(seen) => seen,
-            None => self.snapshot().await?,
-        };
+        let seen = self.last_seen().await?;
         let to = self.file.nearest(to);
         if self.check(&seen, to).is_ok() {
             return Ok(to);
@@ -38,11 +34,7 @@ impl<R: Rig> Drive<R> {
         to: Pose,
         arms: impl IntoIterator<Item = (Arm, Profile)>,
     ) -> Result<(), DriveError<R::Error>> {
-        let seen = *self.seen.borrow();
-        let seen = match seen {
-            Some(seen) => seen,
-            None => self.snapshot().await?,
-        };
+        let seen = self.last_seen().await?;
         self.check(&seen, to)?;
         for (arm, profile) in arms {
             let goal = to.angle(arm);
@@ -95,13 +87,18 @@ impl<R: Rig> Drive<R> {
     /// # Errors
     /// A silent or failing servo.
     pub async fn steer(&mut self, arm: Arm, profile: Profile) -> Result<(), DriveError<R::Error>> {
-        let seen = *self.seen.borrow();
-        let goal = match seen {
-            Some(snapshot) => snapshot.arms[arm as usize].goal,
-            None => self.snapshot().await?.arms[arm as usize].goal,
-        };
+        let goal = self.last_seen().await?.arms[arm as usize].goal;
         self.retry("steer an arm", |rig| Box::pin(rig.axis(arm).steer(goal, profile)))
             .await
+    }
+
+    /// What was seen of the rig last; a look at it where nobody looked yet.
+    async fn last_seen(&mut self) -> Result<Snapshot, DriveError<R::Error>> {
+        let seen = *self.seen.borrow();
+        match seen {
+            Some(seen) => Ok(seen),
+            None => self.snapshot().await,
+        }
     }
 }
 

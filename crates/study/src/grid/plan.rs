@@ -71,10 +71,7 @@ impl GridPlan {
         } else {
             text += "[sweep]\n";
         }
-        text += match self.mode {
-            Mode::Step => "mode = \"step\"\n",
-            Mode::Fly => "mode = \"fly\"\n",
-        };
+        text += &format!("mode = \"{}\"\n", self.mode.name());
         let name = format!(
             "{} planes, {} readings, arc {}, {}",
             self.planes(),
@@ -87,11 +84,7 @@ impl GridPlan {
 
     /// What rows call the motion: "step at 60 °/s".
     pub fn motion(&self) -> String {
-        let mode = match self.mode {
-            Mode::Step => "step",
-            Mode::Fly => "fly",
-        };
-        format!("{mode} at {} °/s", self.speed_deg_s)
+        format!("{} at {} °/s", self.mode.name(), self.speed_deg_s)
     }
 
     /// The rig file whose arms move so fast.
